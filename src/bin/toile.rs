@@ -1,0 +1,2 @@
+//! toile
+fn main() {}

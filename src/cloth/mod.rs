@@ -1,0 +1,68 @@
+//! Rest data of the triangle part: the flat mesh, its fabrics, lumped areas and masses.
+
+use crate::error::Result;
+use crate::math::Vec2;
+use crate::pattern::{Fabric, Garment};
+use crate::tri::GarmentMesh;
+
+/// Everything that the triangle energies are built from.
+#[derive(Clone, Debug, Default)]
+pub struct Cloth {
+    /// The triangulated garment.
+    pub mesh: GarmentMesh,
+    /// Fabrics of the garment.
+    pub fabrics: Vec<Fabric>,
+    /// Fabric of each panel.
+    pub panel_fabric: Vec<usize>,
+    /// Warp direction of each panel, angle from `+v` [rad].
+    pub panel_grain: Vec<f64>,
+    /// Rest area of each triangle [m^2].
+    pub areas: Vec<f64>,
+    /// A third of the area of the triangles around each vertex [m^2].
+    pub vertex_areas: Vec<f64>,
+    /// Lumped mass of each vertex [kg].
+    pub masses: Vec<f64>,
+}
+
+impl Cloth {
+    /// Rest data of a garment on one of its meshes. A triangle without area is refused.
+    pub fn new(garment: &Garment, mesh: GarmentMesh) -> Result<Self> {
+        use crate::error::Error;
+        for fabric in &garment.fabrics {
+            fabric.check()?;
+        }
+        let mut cloth = Self {
+            fabrics: garment.fabrics.clone(),
+            panel_fabric: garment.panels.iter().map(|p| p.fabric).collect(),
+            panel_grain: garment.panels.iter().map(|p| p.grain).collect(),
+            areas: Vec::with_capacity(mesh.triangles.len()),
+            vertex_areas: vec![0.0; mesh.uv.len()],
+            masses: vec![0.0; mesh.uv.len()],
+            mesh,
+        };
+        for (t, tri) in cloth.mesh.triangles.iter().enumerate() {
+            let [a, b, c] = tri.map(|v| cloth.mesh.uv[v as usize]);
+            let area = 0.5 * cross(&(b - a), &(c - a)).abs();
+            if area.is_nan() || area <= 0.0 {
+                return Err(Error::geometry(format!("triangle {t} has area {area}")));
+            }
+            let panel = cloth.mesh.triangle_panel[t] as usize;
+            let density = cloth.fabrics[cloth.panel_fabric[panel]].density;
+            for &v in tri {
+                cloth.vertex_areas[v as usize] += area / 3.0;
+                cloth.masses[v as usize] += area * density / 3.0;
+            }
+            cloth.areas.push(area);
+        }
+        Ok(cloth)
+    }
+
+    /// Fabric of a triangle.
+    pub fn fabric_of(&self, triangle: usize) -> &Fabric {
+        &self.fabrics[self.panel_fabric[self.mesh.triangle_panel[triangle] as usize]]
+    }
+}
+
+fn cross(a: &Vec2, b: &Vec2) -> f64 {
+    a.x * b.y - a.y * b.x
+}

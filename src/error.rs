@@ -1,0 +1,105 @@
+//! One error type for the whole library: a fixed status code, a text that says what and where.
+//!
+//! The codes are the ones of the C ABI and never change their value: `-1..` use of the API,
+//! `-20..` data, `-40..` numerics, `-60..` GPU, `-100` a panic caught at the boundary.
+
+use std::fmt;
+
+/// What went wrong, as a number that is fixed for ever.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[repr(i32)]
+pub enum Status {
+    /// No error.
+    Ok = 0,
+    /// An argument is NULL, not finite, out of range, or contradicts another.
+    Argument = -1,
+    /// A handle is NULL, stale, freed, or of another kind.
+    Handle = -2,
+    /// The handle is in use by another thread.
+    Busy = -3,
+    /// The caller's buffer is too small, or a count does not fit.
+    Size = -4,
+    /// The object's present state does not allow the call.
+    State = -5,
+    /// The library does not offer this for the object at hand.
+    Unsupported = -6,
+    /// The host's progress callback asked to stop.
+    Cancelled = -7,
+    /// Text that is not the expected format (JSON, OBJ, snapshot).
+    Parse = -20,
+    /// A pattern, mesh or body whose geometry cannot be.
+    Geometry = -21,
+    /// A fabric whose numbers cannot be.
+    Material = -22,
+    /// More memory or elements asked for than the limit.
+    Limit = -23,
+    /// A file could not be read or written.
+    Io = -24,
+    /// No admissible state was found (the step was cut down to the smallest size).
+    NoAdmissibleState = -40,
+    /// A linear system could not be solved.
+    LinearSolve = -41,
+    /// A panic was caught; the handle it happened in is poisoned.
+    Panic = -100,
+}
+
+/// An error: status, and a text that names what, where, the limit and the value.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Error {
+    /// The fixed code.
+    pub status: Status,
+    /// What, where (panel, seam, vertex), the limit and the value.
+    pub message: String,
+}
+
+/// Result with the library's error.
+pub type Result<T> = std::result::Result<T, Error>;
+
+impl Error {
+    /// An error with this status and text.
+    pub fn new(status: Status, message: impl Into<String>) -> Self {
+        Self {
+            status,
+            message: message.into(),
+        }
+    }
+
+    /// The same error with its place put before the text: `place: text`.
+    #[must_use]
+    pub fn at(mut self, place: impl fmt::Display) -> Self {
+        self.message = format!("{place}: {}", self.message);
+        self
+    }
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+impl std::error::Error for Error {}
+
+macro_rules! constructors {
+    ($($name:ident => $status:ident),* $(,)?) => {
+        impl Error {
+            $(
+                #[doc = concat!("An error of status `", stringify!($status), "`.")]
+                pub fn $name(message: impl Into<String>) -> Self {
+                    Self::new(Status::$status, message)
+                }
+            )*
+        }
+    };
+}
+
+constructors! {
+    argument => Argument,
+    state => State,
+    unsupported => Unsupported,
+    parse => Parse,
+    geometry => Geometry,
+    material => Material,
+    limit => Limit,
+    io => Io,
+}

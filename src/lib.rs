@@ -1,0 +1,16 @@
+//! toile: garment simulation in which yarns and triangles share one mechanical system.
+//!
+//! Read `ARCHITECTURE.md` for the shape of the house. Modules import only from modules that stand
+//! before them in this list.
+
+pub mod body;
+pub mod cloth;
+pub mod error;
+pub mod math;
+pub mod pattern;
+pub mod readout;
+pub mod scene;
+pub mod sim;
+pub mod solve;
+pub mod system;
+pub mod tri;

@@ -1,0 +1,1 @@
+//! Refuses garments that cannot be, naming panel, edge or seam.

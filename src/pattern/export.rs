@@ -1,0 +1,1 @@
+//! Flat patterns to files: toile's own JSON, SVG.

@@ -1,0 +1,112 @@
+//! What a fabric is: areal density, membrane and bending stiffness, damping, thickness, friction.
+
+use crate::error::{Error, Result};
+
+/// Which bending energy a fabric uses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum BendingModel {
+    /// Discrete-shells hinges with a rest angle.
+    #[default]
+    Hinge,
+    /// Quadratic (isometric) bending with a constant Hessian; flat rest shape only.
+    Quadratic,
+}
+
+/// Numbers of one fabric, SI units.
+///
+/// Membrane energy per rest area, Green strain `E` in the (weft, warp) frame:
+/// `1/2 (weft E11^2 + 2 coupling E11 E22 + warp E22^2 + shear (2 E12)^2)`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fabric {
+    /// Name by which panels ask for it.
+    pub name: String,
+    /// Mass per area [kg/m^2].
+    pub density: f64,
+    /// Stiffness along the warp [N/m].
+    pub warp: f64,
+    /// Stiffness along the weft [N/m].
+    pub weft: f64,
+    /// Coupling `c12` between warp and weft [N/m]; Poisson ratio times stiffness.
+    pub coupling: f64,
+    /// Shear stiffness, force per length per shear angle [N/m].
+    pub shear: f64,
+    /// Flexural rigidity per width for bending that curves the warp [N m].
+    pub bending_warp: f64,
+    /// Flexural rigidity per width for bending that curves the weft [N m].
+    pub bending_weft: f64,
+    /// Bending energy used.
+    pub bending_model: BendingModel,
+    /// Mass-proportional damping [1/s].
+    pub damping_mass: f64,
+    /// Stiffness-proportional damping [s].
+    pub damping_stiffness: f64,
+    /// Thickness [m]: half of it is kept free around the middle surface in contacts.
+    pub thickness: f64,
+    /// Coulomb friction of cloth on cloth.
+    pub friction: f64,
+}
+
+impl Default for Fabric {
+    fn default() -> Self {
+        Self {
+            name: "plain cotton".into(),
+            density: 0.2,
+            warp: 1000.0,
+            weft: 1000.0,
+            coupling: 0.0,
+            shear: 200.0,
+            bending_warp: 1e-5,
+            bending_weft: 1e-5,
+            bending_model: BendingModel::Hinge,
+            damping_mass: 0.0,
+            damping_stiffness: 0.0,
+            thickness: 1e-3,
+            friction: 0.3,
+        }
+    }
+}
+
+impl Fabric {
+    /// Refuses numbers that are not finite, signs that cannot be, and a membrane that is not
+    /// positive definite (`coupling^2 < warp * weft`).
+    pub fn check(&self) -> Result<()> {
+        let positive = [
+            ("density", self.density),
+            ("membrane.warp", self.warp),
+            ("membrane.weft", self.weft),
+            ("membrane.shear", self.shear),
+        ];
+        let not_negative = [
+            ("bending.warp", self.bending_warp),
+            ("bending.weft", self.bending_weft),
+            ("damping.mass", self.damping_mass),
+            ("damping.stiffness", self.damping_stiffness),
+            ("thickness", self.thickness),
+            ("friction", self.friction),
+        ];
+        let refuse = |key: &str, value: f64, rule: &str| {
+            Err(Error::material(format!(
+                "fabric '{}': {key} = {value} must be {rule}",
+                self.name
+            )))
+        };
+        for (key, value) in positive {
+            if !value.is_finite() || value <= 0.0 {
+                return refuse(key, value, "finite and positive");
+            }
+        }
+        for (key, value) in not_negative {
+            if !value.is_finite() || value < 0.0 {
+                return refuse(key, value, "finite and not negative");
+            }
+        }
+        if !self.coupling.is_finite() || self.coupling * self.coupling >= self.warp * self.weft {
+            return refuse(
+                "membrane.coupling",
+                self.coupling,
+                "below sqrt(warp weft) in size",
+            );
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,1 @@
+//! Patterns from files: toile's own JSON, GarmentCode specifications.

@@ -1,0 +1,1 @@
+//! What hosts and people look at: surfaces, exports, pictures.

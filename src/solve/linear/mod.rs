@@ -1,0 +1,32 @@
+//! Linear systems `A x = b` with symmetric positive definite block-sparse `A`, behind one trait.
+
+use crate::math::Vec3;
+use crate::math::block::BlockMatrix;
+
+/// Why a factorization or an iteration failed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LinearError {
+    /// A pivot was not positive.
+    NotPositiveDefinite,
+    /// The iteration limit was reached, or the iteration broke down.
+    NoConvergence,
+}
+
+/// One way of solving.
+pub trait LinearSolver: Send {
+    /// Stable name, as in reports and as users force it.
+    fn name(&self) -> &'static str;
+    /// Takes a new matrix. Reuses the symbolic analysis while the pattern stays the same.
+    fn prepare(&mut self, matrix: &BlockMatrix) -> Result<(), LinearError>;
+    /// Solves for `x` (whose content on entry is ignored), `matrix` being the one last prepared.
+    /// Returns the iterations taken; a direct solve counts one.
+    fn solve(
+        &mut self,
+        matrix: &BlockMatrix,
+        b: &[Vec3],
+        x: &mut [Vec3],
+        tolerance: f64,
+    ) -> Result<u32, LinearError>;
+    /// Bytes held by factors and work arrays.
+    fn bytes(&self) -> usize;
+}

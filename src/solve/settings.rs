@@ -1,0 +1,106 @@
+//! Tunables, each with a dotted name, a default, a range and a one-line meaning: the same names in
+//! the scene file and in `set_number`.
+
+use crate::error::{Error, Result};
+
+macro_rules! settings {
+    ($($(#[doc = $doc:literal])+ $field:ident: $name:literal = $default:expr, $min:expr, $max:expr, $unit:literal;)*) => {
+        /// Numbers that steer the solvers.
+        #[derive(Clone, Debug, PartialEq)]
+        pub struct Settings {
+            $($(#[doc = $doc])+ pub $field: f64,)*
+        }
+
+        impl Default for Settings {
+            fn default() -> Self {
+                Self { $($field: $default,)* }
+            }
+        }
+
+        impl Settings {
+            /// Every tunable.
+            pub const KEYS: &'static [Key] = &[
+                $(Key { name: $name, default: $default, min: $min, max: $max, unit: $unit,
+                        doc: concat!($($doc,)+) },)*
+            ];
+
+            /// Value by dotted name.
+            pub fn get(&self, name: &str) -> Option<f64> {
+                match name {
+                    $($name => Some(self.$field),)*
+                    _ => None,
+                }
+            }
+
+            /// Sets a value by dotted name; unknown names and values out of range are refused.
+            pub fn set(&mut self, name: &str, value: f64) -> Result<()> {
+                match name {
+                    $($name => { self.$field = in_range(name, value, $min, $max)?; })*
+                    _ => return Err(Error::argument(format!("'{name}' is not the name of a number; `toile schema` lists them"))),
+                }
+                Ok(())
+            }
+        }
+    };
+}
+
+/// One tunable as `toile schema` prints it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Key {
+    /// Dotted name.
+    pub name: &'static str,
+    /// Value unless set.
+    pub default: f64,
+    /// Smallest admissible value.
+    pub min: f64,
+    /// Largest admissible value.
+    pub max: f64,
+    /// SI unit, or "1".
+    pub unit: &'static str,
+    /// Meaning.
+    pub doc: &'static str,
+}
+
+fn in_range(name: &str, value: f64, min: f64, max: f64) -> Result<f64> {
+    if value.is_nan() || value < min || value > max {
+        return Err(Error::argument(format!(
+            "{name} = {value} must lie in [{min}, {max}]"
+        )));
+    }
+    Ok(value)
+}
+
+settings! {
+    /// Newton iterations allowed in one substep before it is cut.
+    newton_max_iterations: "solver.newton.max_iterations" = 30.0, 1.0, 10_000.0, "1";
+    /// A substep has converged when the largest Newton correction, over the substep size, is below this speed.
+    newton_velocity_tolerance: "solver.newton.velocity_tolerance" = 1e-3, 1e-12, 1e3, "m/s";
+    /// Smallest substep; below it a step gives up.
+    min_step: "solver.step.min" = 1e-7, 1e-12, 1.0, "s";
+    /// Largest substep.
+    max_step: "solver.step.max" = 0.05, 1e-9, 10.0, "s";
+    /// A drape is at rest when no free vertex carries a larger residual force.
+    drape_force_tolerance: "solver.drape.force_tolerance" = 1e-5, 1e-14, 1e6, "N";
+    /// Pseudo time steps allowed in a drape, on each level.
+    drape_max_steps: "solver.drape.max_steps" = 2000.0, 1.0, 1e7, "1";
+    /// Coarse levels used by a drape from the flat panels, 0 for none.
+    drape_levels: "solver.drape.levels" = 1.0, 0.0, 4.0, "1";
+    /// Linear solver: 0 chooses by size, 1 sparse Cholesky, 2 conjugate gradients with block Jacobi, 3 with incomplete Cholesky.
+    linear_kind: "solver.linear.kind" = 0.0, 0.0, 3.0, "1";
+    /// Relative residual at which conjugate gradients stop.
+    linear_tolerance: "solver.linear.tolerance" = 1e-6, 1e-14, 0.5, "1";
+    /// Worker threads; results do not depend on it.
+    threads: "solver.threads" = 1.0, 1.0, 256.0, "1";
+    /// Cloth against cloth contact: 1 on, 0 off.
+    self_contact: "contact.self.enabled" = 1.0, 0.0, 1.0, "1";
+    /// Stiffness of cloth against cloth, pressure per depth.
+    self_stiffness: "contact.self.stiffness" = 1e6, 0.0, 1e12, "Pa/m";
+    /// Stiffness of the seam springs per length of seam.
+    seam_stiffness: "seam.stiffness" = 2e5, 0.0, 1e12, "N/m^2";
+    /// Quadratic drag of the air along the normal, times density of air.
+    air_drag: "air.drag" = 1.2, 0.0, 1e3, "kg/m^3";
+    /// Tangential drag (skin friction) of the air, times density of air.
+    air_lift: "air.tangential" = 0.06, 0.0, 1e3, "kg/m^3";
+    /// Largest number of vertices that a garment may have.
+    max_vertices: "limits.vertices" = 2e6, 3.0, 1e8, "1";
+}

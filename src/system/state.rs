@@ -1,0 +1,83 @@
+//! Everything that the next step's bits depend on.
+
+use crate::body::Pose;
+use crate::math::Vec3;
+use serde::{Deserialize, Serialize};
+
+/// The mutable part of a simulation; a snapshot is exactly this.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct State {
+    /// Simulated time [s].
+    pub time: f64,
+    /// Vertex positions [m].
+    pub positions: Vec<Vec3>,
+    /// Vertex velocities [m/s].
+    pub velocities: Vec<Vec3>,
+    /// Pinned vertices, sorted by vertex.
+    pub pins: Vec<Pin>,
+    /// One for each body of the world.
+    pub bodies: Vec<BodyState>,
+    /// Friction anchors against bodies, sorted by (vertex, body).
+    pub body_anchors: Vec<BodyAnchor>,
+    /// Friction anchors of cloth on cloth, sorted by (a, b).
+    pub pair_anchors: Vec<PairAnchor>,
+    /// Step size that the controller tries next [s]; infinite before the first step.
+    pub step_size: f64,
+    /// Acceleration of gravity [m/s^2].
+    pub gravity: Vec3,
+    /// Velocity of the air [m/s].
+    pub wind: Vec3,
+    /// Pressure along the cloth's normal [Pa].
+    pub pressure: f64,
+}
+
+/// A vertex held at a place.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Pin {
+    /// The vertex.
+    pub vertex: u32,
+    /// Where it is to be at the end of the next step [m].
+    pub target: Vec3,
+}
+
+/// A body's motion over the next step.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BodyState {
+    /// Pose at the present time.
+    pub pose: Pose,
+    /// Pose at the end of the next step.
+    pub target: Pose,
+    /// Deforming mesh: vertices at the present time, body frame [m]. Empty: as created.
+    pub vertices: Vec<Vec3>,
+    /// Deforming mesh: vertices at the end of the next step. Empty: no change.
+    pub target_vertices: Vec<Vec3>,
+    /// Whether time has advanced since the body came in; before that a new pose is a placement,
+    /// afterwards a motion.
+    pub moved_with_time: bool,
+}
+
+/// Anchor of the moving-anchor friction spring of a vertex on a body.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BodyAnchor {
+    /// The vertex.
+    pub vertex: u32,
+    /// The body.
+    pub body: u32,
+    /// World position at the present time [m].
+    pub point: Vec3,
+    /// Normal force of the last accepted step [N].
+    pub normal_force: f64,
+}
+
+/// Anchor of the friction between two vertices of the cloth.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PairAnchor {
+    /// Smaller vertex.
+    pub a: u32,
+    /// Larger vertex.
+    pub b: u32,
+    /// Anchored value of `x_b - x_a` [m].
+    pub offset: Vec3,
+    /// Normal force of the last accepted step [N].
+    pub normal_force: f64,
+}

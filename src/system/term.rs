@@ -1,0 +1,156 @@
+//! The contract of an energy term.
+//!
+//! A term is a list of stencils (tuples of vertices, all of one arity) and pure functions of one
+//! stencil. Loops, parallelism and scatter live in `assemble`.
+
+use super::state::State;
+use crate::body::Distance;
+use crate::math::{Mat3, Vec2, Vec3};
+use crate::pattern::Fabric;
+
+/// Largest number of vertices in a stencil.
+pub const MAX_ARITY: usize = 4;
+/// Blocks of the lower triangle of the largest stencil.
+pub const MAX_BLOCKS: usize = MAX_ARITY * (MAX_ARITY + 1) / 2;
+
+/// Which second derivative is wanted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HessianKind {
+    /// Positive semi-definite blocks, for Newton.
+    Psd,
+    /// The exact second derivative, for sensitivities.
+    Exact,
+}
+
+/// Where energies are evaluated.
+#[derive(Clone, Copy)]
+pub struct Configuration<'a> {
+    /// Positions [m].
+    pub x: &'a [Vec3],
+    /// Positions at the start of the step [m].
+    pub x0: &'a [Vec3],
+    /// One over the step size [1/s]; 0 in statics, where rate terms vanish.
+    pub inv_dt: f64,
+    /// The world at the end of the step.
+    pub world: &'a World<'a>,
+}
+
+/// What surrounds the garment.
+pub struct World<'a> {
+    /// Acceleration of gravity [m/s^2].
+    pub gravity: Vec3,
+    /// Velocity of the air [m/s].
+    pub wind: Vec3,
+    /// Pressure of the inside on the outside, along the cloth's normal [Pa].
+    pub pressure: f64,
+    /// Bodies as they are at the end of the step.
+    pub bodies: &'a dyn Bodies,
+}
+
+/// Bodies of the world as contacts see them, in world coordinates.
+pub trait Bodies: Send + Sync {
+    /// Number of bodies.
+    fn count(&self) -> usize;
+    /// Signed distance to a body at a world point, with world-frame derivatives.
+    fn distance(&self, body: usize, point: &Vec3) -> Distance;
+    /// Signed distance only.
+    fn value(&self, body: usize, point: &Vec3) -> f64;
+    /// Where the material point of the body that was at `point` at the start of the step is at
+    /// its end.
+    fn carried(&self, body: usize, point: &Vec3) -> Vec3;
+    /// Contact settings of a body.
+    fn contact(&self, body: usize) -> &ContactSettings;
+}
+
+/// How cloth meets one body.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct ContactSettings {
+    /// Coulomb friction.
+    pub friction: f64,
+    /// Gap kept free between the body's surface and the cloth's middle surface [m].
+    pub thickness: f64,
+    /// Penalty: pressure per depth [Pa/m].
+    pub stiffness: f64,
+}
+
+impl Default for ContactSettings {
+    fn default() -> Self {
+        Self {
+            friction: 0.3,
+            thickness: 3e-3,
+            stiffness: 1e7,
+        }
+    }
+}
+
+/// A direction in the space of rest shapes and parameters.
+pub struct RestChange<'a> {
+    /// Rate of the flat coordinates of every vertex [m].
+    pub uv: &'a [Vec2],
+    /// Rate of every number of every fabric.
+    pub fabrics: &'a [Fabric],
+}
+
+/// Stencils of a term: `vertices[arity * e ..][.. arity]` are the vertices of stencil `e`.
+#[derive(Clone, Copy)]
+pub struct Stencils<'a> {
+    /// Vertices per stencil.
+    pub arity: usize,
+    /// All stencils, flat.
+    pub vertices: &'a [u32],
+}
+
+impl<'a> Stencils<'a> {
+    /// Number of stencils.
+    pub fn count(&self) -> usize {
+        self.vertices.len() / self.arity.max(1)
+    }
+
+    /// Vertices of one stencil.
+    pub fn get(&self, e: usize) -> &'a [u32] {
+        &self.vertices[self.arity * e..self.arity * (e + 1)]
+    }
+}
+
+/// An energy (or lagged dissipation potential) as a sum over stencils.
+///
+/// `gradient` writes one vector, `hessian` writes the lower triangle of blocks row by row
+/// (`(0,0), (1,0), (1,1), (2,0), ...`); both overwrite what is there. Block `(i, j)` is
+/// `d^2 V / dx_i dx_j^T`.
+pub trait Term: Send + Sync {
+    /// Stable name, as in reports.
+    fn name(&self) -> &'static str;
+    /// Its stencils, known at build (contacts: after `begin_step`).
+    fn stencils(&self) -> Stencils<'_>;
+    /// Energy of one stencil [J].
+    fn value(&self, e: usize, at: &Configuration<'_>) -> f64;
+    /// Its derivative by the stencil's positions [N].
+    fn gradient(&self, e: usize, at: &Configuration<'_>, out: &mut [Vec3]);
+    /// Its second derivative [N/m].
+    fn hessian(&self, e: usize, at: &Configuration<'_>, kind: HessianKind, out: &mut [Mat3]);
+    /// Directional derivative of `gradient` by rest shape and parameters.
+    fn rest_gradient(
+        &self,
+        e: usize,
+        at: &Configuration<'_>,
+        change: &RestChange<'_>,
+        out: &mut [Vec3],
+    ) {
+        let _ = (e, at, change);
+        out.fill(Vec3::zeros());
+    }
+    /// Whether the energy is internal: no net force, invariant under rotation and translation.
+    fn is_internal(&self) -> bool {
+        true
+    }
+    /// Takes what is lagged (normal forces, anchors, contact pairs) from the state. Returns true if
+    /// the stencils changed.
+    fn begin_step(&mut self, state: &State, at: &Configuration<'_>) -> bool {
+        let _ = (state, at);
+        false
+    }
+    /// After an accepted step: moves friction anchors and other plastic state.
+    fn accept(&mut self, at: &Configuration<'_>, state: &mut State) {
+        let _ = (at, state);
+    }
+}

@@ -1,0 +1,58 @@
+//! Flat panels to triangles: constrained Delaunay refinement, seams matched by fraction of arc
+//! length, placement around the body, coarse levels of the same garment.
+
+use crate::math::{Vec2, Vec3};
+
+/// Triangle mesh of a whole garment; vertices of different panels are never shared.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct GarmentMesh {
+    /// Flat coordinates in the vertex's panel [m].
+    pub uv: Vec<Vec2>,
+    /// World position before sewing [m].
+    pub placed: Vec<Vec3>,
+    /// Panel of each vertex.
+    pub vertex_panel: Vec<u32>,
+    /// Vertex triples, ordered so that the normal points to the outside of the cloth.
+    pub triangles: Vec<[u32; 3]>,
+    /// Panel of each triangle.
+    pub triangle_panel: Vec<u32>,
+    /// `edge_vertices[panel][edge]`: vertices along that edge from its start to its end.
+    pub edge_vertices: Vec<Vec<Vec<u32>>>,
+    /// One entry for each seam of the garment.
+    pub seams: Vec<SeamMesh>,
+    /// First vertex of each panel, length `panel_count + 1`: a panel's vertices are contiguous.
+    pub panel_starts: Vec<u32>,
+    /// Smallest triangle angle [rad].
+    pub min_angle: f64,
+}
+
+/// A seam on the mesh.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SeamMesh {
+    /// Vertices tied to points of edges of the other side.
+    pub links: Vec<SeamLink>,
+    /// Rest angle across the seam [rad].
+    pub rest_angle: f64,
+}
+
+/// `vertex` is tied to the point `(1 - t) edge[0] + t edge[1]`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SeamLink {
+    /// The emitting vertex.
+    pub vertex: u32,
+    /// The receiving boundary edge.
+    pub edge: [u32; 2],
+    /// Position on the receiving edge, 0 to 1.
+    pub t: f64,
+    /// Length of seam that this link stands for [m].
+    pub length: f64,
+}
+
+/// Where each vertex of a fine mesh lies in a coarse mesh of the same garment.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Transfer {
+    /// Coarse triangle of each fine vertex.
+    pub triangle: Vec<u32>,
+    /// Barycentric weights in it; a fine vertex just outside the coarse outline extrapolates.
+    pub weights: Vec<[f64; 3]>,
+}
