@@ -1,4 +1,16 @@
 //! Linear systems `A x = b` with symmetric positive definite block-sparse `A`, behind one trait.
+//!
+//! * [`direct`]: supernodal Cholesky, ordered by approximate minimum degree on the block graph.
+//! * [`pcg`]: conjugate gradients with a [`pcg::Preconditioner`]: [`jacobi`] (3x3 diagonal blocks)
+//!   or [`ic0`] (incomplete Cholesky on the pattern of `A`, in an [`ordering`]).
+//! * [`choose`]: which of them, by number or by measured crossover.
+
+pub mod choose;
+pub mod direct;
+pub mod ic0;
+pub mod jacobi;
+pub mod ordering;
+pub mod pcg;
 
 use crate::math::Vec3;
 use crate::math::block::BlockMatrix;

@@ -1,0 +1,166 @@
+//! Conjugate gradients with a preconditioner (Hestenes and Stiefel 1952; Saad 2003, algorithm 9.1).
+//!
+//! Stops when `|b - A x| <= tolerance |b|` in the Euclidean norm, that is in newtons, whatever the
+//! preconditioner. The recursive residual drifts from the true one as the condition number grows,
+//! so the true one is computed before the answer is given, and the iteration is restarted from it
+//! when it does not hold.
+//!
+//! A direction of negative curvature gives `NotPositiveDefinite`. Sums run over vertices in order,
+//! so results do not depend on threads. No allocation while the size stays the same.
+
+use super::{LinearError, LinearSolver};
+use crate::math::Vec3;
+use crate::math::block::BlockMatrix;
+
+/// An approximation of the inverse, symmetric and positive definite.
+pub trait Preconditioner: Send {
+    /// Stable name of the solver made with it, as in reports.
+    fn solver_name(&self) -> &'static str;
+    /// Takes a new matrix. Keeps what depends on the pattern alone while that stays the same.
+    fn prepare(&mut self, matrix: &BlockMatrix) -> Result<(), LinearError>;
+    /// `z = M^-1 r` for the matrix last prepared.
+    fn apply(&mut self, r: &[Vec3], z: &mut [Vec3]);
+    /// Bytes held.
+    fn bytes(&self) -> usize;
+}
+
+/// Times that a drifted iteration is restarted from the true residual.
+const RESTARTS: u32 = 10;
+
+/// Conjugate gradients.
+pub struct ConjugateGradients {
+    preconditioner: Box<dyn Preconditioner>,
+    limit: Option<u32>,
+    r: Vec<Vec3>,
+    z: Vec<Vec3>,
+    p: Vec<Vec3>,
+    q: Vec<Vec3>,
+}
+
+impl ConjugateGradients {
+    /// With the default iteration limit `500 + 60 sqrt(3 n)`.
+    pub fn new(preconditioner: Box<dyn Preconditioner>) -> Self {
+        Self {
+            preconditioner,
+            limit: None,
+            r: Vec::new(),
+            z: Vec::new(),
+            p: Vec::new(),
+            q: Vec::new(),
+        }
+    }
+
+    /// The same with its own iteration limit.
+    #[must_use]
+    pub fn with_limit(mut self, limit: u32) -> Self {
+        self.limit = Some(limit);
+        self
+    }
+}
+
+impl LinearSolver for ConjugateGradients {
+    fn name(&self) -> &'static str {
+        self.preconditioner.solver_name()
+    }
+
+    fn prepare(&mut self, matrix: &BlockMatrix) -> Result<(), LinearError> {
+        for work in [&mut self.r, &mut self.z, &mut self.p, &mut self.q] {
+            work.resize(matrix.n(), Vec3::zeros());
+        }
+        self.preconditioner.prepare(matrix)
+    }
+
+    fn solve(
+        &mut self,
+        matrix: &BlockMatrix,
+        b: &[Vec3],
+        x: &mut [Vec3],
+        tolerance: f64,
+    ) -> Result<u32, LinearError> {
+        let n = matrix.n();
+        if [b.len(), x.len(), self.r.len()] != [n; 3] {
+            return Err(LinearError::NoConvergence);
+        }
+        x.fill(Vec3::zeros());
+        let goal = dot(b, b) * tolerance * tolerance;
+        if goal == 0.0 && b.iter().all(|v| *v == Vec3::zeros()) {
+            return Ok(0);
+        }
+        if !goal.is_finite() {
+            return Err(LinearError::NoConvergence);
+        }
+        let limit = self
+            .limit
+            .unwrap_or(500 + (60.0 * (3.0 * n as f64).sqrt()) as u32);
+        self.r.copy_from_slice(b);
+        let mut iterations = 0;
+        for _ in 0..=RESTARTS {
+            self.iterate(matrix, x, goal, limit, &mut iterations)?;
+            matrix.multiply(x, &mut self.q);
+            for i in 0..n {
+                self.r[i] = b[i] - self.q[i];
+            }
+            if dot(&self.r, &self.r) <= goal {
+                return Ok(iterations);
+            }
+        }
+        Err(LinearError::NoConvergence)
+    }
+
+    fn bytes(&self) -> usize {
+        4 * size_of::<Vec3>() * self.r.len() + self.preconditioner.bytes()
+    }
+}
+
+impl ConjugateGradients {
+    /// Iterates from `x` with residual `self.r` until the recursive residual meets the goal.
+    fn iterate(
+        &mut self,
+        matrix: &BlockMatrix,
+        x: &mut [Vec3],
+        goal: f64,
+        limit: u32,
+        iterations: &mut u32,
+    ) -> Result<(), LinearError> {
+        self.preconditioner.apply(&self.r, &mut self.z);
+        self.p.copy_from_slice(&self.z);
+        let mut rz = dot(&self.r, &self.z);
+        let mut rr = dot(&self.r, &self.r);
+        while rr > goal {
+            if *iterations >= limit {
+                return Err(LinearError::NoConvergence);
+            }
+            *iterations += 1;
+            matrix.multiply(&self.p, &mut self.q);
+            let curvature = dot(&self.p, &self.q);
+            if curvature.is_nan() || rz.is_nan() {
+                return Err(LinearError::NoConvergence);
+            }
+            if curvature <= 0.0 || rz <= 0.0 {
+                return Err(LinearError::NotPositiveDefinite);
+            }
+            let alpha = rz / curvature;
+            rr = 0.0;
+            for i in 0..x.len() {
+                x[i] += alpha * self.p[i];
+                self.r[i] -= alpha * self.q[i];
+                rr += self.r[i].norm_squared();
+            }
+            self.preconditioner.apply(&self.r, &mut self.z);
+            let next = dot(&self.r, &self.z);
+            let beta = next / rz;
+            rz = next;
+            for i in 0..x.len() {
+                self.p[i] = self.z[i] + beta * self.p[i];
+            }
+        }
+        if rr.is_nan() {
+            return Err(LinearError::NoConvergence);
+        }
+        Ok(())
+    }
+}
+
+fn dot(a: &[Vec3], b: &[Vec3]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
+}

@@ -1,0 +1,289 @@
+//! Laws of the linear solvers.
+
+mod linear_cases;
+
+use linear_cases::{Random, add, forces, residual, sewn_cloth};
+use toile::math::block::{BlockMatrix, BlockPattern};
+use toile::math::{Mat3, Vec3};
+use toile::solve::linear::choose::{CROSSOVER, solver};
+use toile::solve::linear::direct::Direct;
+use toile::solve::linear::ic0::{IncompleteCholesky, Order, Storage};
+use toile::solve::linear::jacobi::BlockJacobi;
+use toile::solve::linear::ordering::{ORDINARY, reverse_cuthill_mckee};
+use toile::solve::linear::pcg::{ConjugateGradients, Preconditioner};
+use toile::solve::linear::{LinearError, LinearSolver};
+
+fn all(priorities: &[u8]) -> Vec<Box<dyn LinearSolver>> {
+    let cg = |p: Box<dyn Preconditioner>| -> Box<dyn LinearSolver> {
+        Box::new(ConjugateGradients::new(p).with_limit(20_000))
+    };
+    let ic = |o, s| cg(Box::new(IncompleteCholesky::new(o, s)));
+    vec![
+        Box::new(Direct::new()),
+        cg(Box::new(BlockJacobi::new())),
+        ic(Order::Natural, Storage::F64),
+        ic(Order::CuthillMckee, Storage::F32),
+        ic(Order::Priorities(priorities.to_vec()), Storage::F64),
+        ic(Order::Priorities(priorities.to_vec()), Storage::F32),
+    ]
+}
+
+fn dense(matrix: &BlockMatrix) -> nalgebra::DMatrix<f64> {
+    let n = matrix.n();
+    let mut full = nalgebra::DMatrix::zeros(3 * n, 3 * n);
+    for j in 0..n {
+        for k in matrix.pattern.starts[j] as usize..matrix.pattern.starts[j + 1] as usize {
+            let i = matrix.pattern.rows[k] as usize;
+            for r in 0..3 {
+                for c in 0..3 {
+                    full[(3 * i + r, 3 * j + c)] = matrix.blocks[k][(r, c)];
+                    full[(3 * j + c, 3 * i + r)] = matrix.blocks[k][(r, c)];
+                }
+            }
+        }
+    }
+    full
+}
+
+/// A chain of random symmetric positive definite couplings.
+fn chain(n: usize, seed: u64, anchored: bool) -> BlockMatrix {
+    let mut random = Random(seed);
+    let pattern = BlockPattern::from_stencils(n, |sink| {
+        for i in 1..n as u32 {
+            sink(&[i - 1, i]);
+        }
+    });
+    let mut matrix = BlockMatrix::zeros(pattern);
+    for i in 1..n as u32 {
+        let a = Mat3::from_fn(|_, _| random.signed());
+        let k = a * a.transpose() + Mat3::identity();
+        add(&mut matrix, &[i - 1, i], &[k, -k, -k, k]);
+    }
+    if anchored {
+        matrix.blocks[0] += Mat3::identity() * 0.5;
+    }
+    matrix
+}
+
+/// Every solver gives the dense solution to 1e-10 of its norm.
+#[test]
+fn every_solver_agrees_with_the_dense_solution() {
+    let case = sewn_cloth(100, 2, 3e-3);
+    let n = case.matrix.n();
+    let b = forces(n, 3);
+    let flat = nalgebra::DVector::from_iterator(3 * n, b.iter().flat_map(|v| v.iter().copied()));
+    let reference = dense(&case.matrix)
+        .cholesky()
+        .expect("positive definite")
+        .solve(&flat);
+    for mut solver in all(&case.priorities) {
+        solver.prepare(&case.matrix).expect("prepares");
+        let mut x = vec![Vec3::repeat(f64::NAN); n];
+        let its = solver
+            .solve(&case.matrix, &b, &mut x, 1e-13)
+            .expect("solves");
+        let mut error = 0.0;
+        for (i, v) in x.iter().enumerate() {
+            error += (v - reference.fixed_rows::<3>(3 * i)).norm_squared();
+        }
+        let error = error.sqrt() / reference.norm();
+        println!(
+            "{:<10} {its:>4} iterations, error {error:.1e}",
+            solver.name()
+        );
+        assert!(error < 1e-10, "{}: {error:e}", solver.name());
+    }
+}
+
+/// At a coarser tolerance the reported solution meets it, in the true residual.
+#[test]
+fn the_tolerance_holds_for_the_true_residual() {
+    let case = sewn_cloth(1_600, 4, 1e-2);
+    let b = forces(case.matrix.n(), 11);
+    let mut x = vec![Vec3::zeros(); b.len()];
+    for mut solver in all(&case.priorities) {
+        solver.prepare(&case.matrix).expect("prepares");
+        for tolerance in [1e-2, 1e-6, 1e-9] {
+            solver
+                .solve(&case.matrix, &b, &mut x, tolerance)
+                .expect("solves");
+            assert!(
+                residual(&case.matrix, &b, &x) <= tolerance,
+                "{}",
+                solver.name()
+            );
+        }
+    }
+}
+
+/// A block tridiagonal matrix has no fill, so IC(0) is its Cholesky factor: CG ends at once.
+#[test]
+fn incomplete_cholesky_is_exact_on_tridiagonal_matrices() {
+    for order in [
+        Order::Natural,
+        Order::CuthillMckee,
+        Order::Given((0..40).rev().collect()),
+    ] {
+        let matrix = chain(40, 5, true);
+        let b = forces(40, 1);
+        let mut factor = IncompleteCholesky::new(order.clone(), Storage::F64);
+        factor.prepare(&matrix).expect("prepares");
+        assert_eq!(factor.shift(), 0.0);
+        let mut x = vec![Vec3::zeros(); 40];
+        factor.apply(&b, &mut x);
+        let error = residual(&matrix, &b, &x);
+        assert!(error < 1e-11, "{order:?}: residual {error:e}");
+    }
+}
+
+/// Singular (free to translate), indefinite and non-finite matrices are refused, not solved.
+#[test]
+fn matrices_that_are_not_positive_definite_are_refused() {
+    let free = chain(30, 9, false);
+    let mut negative = chain(30, 9, true);
+    let slot = negative.pattern.starts[17] as usize;
+    negative.blocks[slot][(1, 1)] = -1.0;
+    let mut indefinite = chain(30, 9, true);
+    let slot = indefinite.pattern.starts[17] as usize;
+    indefinite.blocks[slot] -= Mat3::identity() * 3.0;
+    let mut nan = chain(30, 9, true);
+    nan.blocks[4][(2, 0)] = f64::NAN;
+    let mut b = forces(30, 2);
+    let mut x = vec![Vec3::zeros(); 30];
+    for matrix in [&free, &negative, &indefinite, &nan] {
+        let mut direct = Direct::new();
+        assert_eq!(
+            direct.prepare(matrix),
+            Err(LinearError::NotPositiveDefinite)
+        );
+        assert!(direct.solve(matrix, &b, &mut x, 1e-6).is_err());
+    }
+    // Conjugate gradients notice on the way; a free chain has no solution under a net force.
+    for (what, matrix) in [
+        ("free", &free),
+        ("negative", &negative),
+        ("indefinite", &indefinite),
+        ("nan", &nan),
+    ] {
+        for mut solver in all(&[ORDINARY; 30]).into_iter().skip(1) {
+            let result = solver
+                .prepare(matrix)
+                .and_then(|()| solver.solve(matrix, &b, &mut x, 1e-9));
+            assert!(result.is_err(), "{what}: {} gave {result:?}", solver.name());
+        }
+    }
+    b[3].x = f64::INFINITY;
+    let sound = chain(30, 9, true);
+    for mut solver in all(&[ORDINARY; 30]) {
+        solver.prepare(&sound).expect("prepares");
+        assert!(
+            solver.solve(&sound, &b, &mut x, 1e-9).is_err(),
+            "{}",
+            solver.name()
+        );
+    }
+}
+
+/// After a refused matrix a solver works again, and a changed pattern is noticed.
+#[test]
+fn a_solver_follows_changes_of_values_and_pattern() {
+    let cases = [
+        sewn_cloth(100, 2, 1e-3),
+        sewn_cloth(100, 2, 1e-2),
+        sewn_cloth(150, 3, 1e-3),
+    ];
+    let bad = chain(30, 9, false);
+    let priorities = vec![ORDINARY; 200];
+    for (mut kept, k) in all(&priorities).into_iter().zip(0..) {
+        for case in &cases {
+            let b = forces(case.matrix.n(), 4);
+            let mut x = vec![Vec3::zeros(); b.len()];
+            let mut y = x.clone();
+            kept.prepare(&case.matrix).expect("prepares");
+            kept.solve(&case.matrix, &b, &mut x, 1e-9).expect("solves");
+            let mut fresh = all(&priorities).swap_remove(k);
+            fresh.prepare(&case.matrix).expect("prepares");
+            fresh.solve(&case.matrix, &b, &mut y, 1e-9).expect("solves");
+            let same = x.iter().zip(&y).all(|(x, y)| {
+                x.iter()
+                    .zip(y.iter())
+                    .all(|(x, y)| x.to_bits() == y.to_bits())
+            });
+            assert!(
+                same,
+                "{}: bits depend on what was solved before",
+                kept.name()
+            );
+            let _ = kept.prepare(&bad);
+        }
+    }
+}
+
+/// Empty and single-vertex systems are no special case for the caller.
+#[test]
+fn the_smallest_systems_are_solved() {
+    for n in [0, 1] {
+        let mut matrix = BlockMatrix::zeros(BlockPattern::from_stencils(n, |_| {}));
+        matrix.blocks.fill(Mat3::identity() * 2.0);
+        let b = vec![Vec3::new(2.0, 4.0, 6.0); n];
+        for mut solver in all(&[]) {
+            let mut x = vec![Vec3::zeros(); n];
+            solver.prepare(&matrix).expect("prepares");
+            solver.solve(&matrix, &b, &mut x, 1e-12).expect("solves");
+            for v in x {
+                assert!((v - Vec3::new(1.0, 2.0, 3.0)).norm() < 1e-14);
+            }
+        }
+    }
+}
+
+/// The order is a permutation, priorities come first, and neighbours stay near in it.
+#[test]
+fn cuthill_mckee_is_a_permutation_of_small_bandwidth() {
+    let case = sewn_cloth(900, 1, 1e-3);
+    let n = case.matrix.n();
+    let mut shuffle: Vec<u32> = (0..n as u32).collect();
+    let mut random = Random(17);
+    for i in (1..n).rev() {
+        shuffle.swap(i, (random.next() % (i as u64 + 1)) as usize);
+    }
+    let old = &case.matrix.pattern;
+    let pattern = BlockPattern::from_stencils(n, |sink| {
+        for j in 0..n {
+            for k in old.starts[j] as usize..old.starts[j + 1] as usize {
+                sink(&[shuffle[old.rows[k] as usize], shuffle[j]]);
+            }
+        }
+    });
+    let order = reverse_cuthill_mckee(&pattern, None);
+    let mut place = vec![usize::MAX; n];
+    for (new, &v) in order.iter().enumerate() {
+        assert_eq!(std::mem::replace(&mut place[v as usize], new), usize::MAX);
+    }
+    let mut bandwidth = 0;
+    for j in 0..n {
+        for k in pattern.starts[j] as usize..pattern.starts[j + 1] as usize {
+            bandwidth = bandwidth.max(place[pattern.rows[k] as usize].abs_diff(place[j]));
+        }
+    }
+    // A 30 x 30 grid whose stencil reaches two rows.
+    assert!(bandwidth < 4 * 30, "bandwidth {bandwidth}");
+    let case = sewn_cloth(400, 3, 1e-3);
+    let order = reverse_cuthill_mckee(&case.matrix.pattern, Some(&case.priorities));
+    assert!(
+        order
+            .windows(2)
+            .all(|w| case.priorities[w[0] as usize] <= case.priorities[w[1] as usize])
+    );
+    assert!(case.priorities.contains(&0) && case.priorities.contains(&1));
+}
+
+/// Numbers in the settings choose what they say, and the automatic choice turns at the crossover.
+#[test]
+fn the_choice_follows_its_number() {
+    assert_eq!(solver(1, 10, None).name(), "cholesky");
+    assert_eq!(solver(2, 10, None).name(), "cg_jacobi");
+    assert_eq!(solver(3, 10, Some(&[0; 10])).name(), "cg_ic0");
+    assert_eq!(solver(0, CROSSOVER - 1, None).name(), "cholesky");
+    assert_eq!(solver(0, CROSSOVER, None).name(), "cg_ic0");
+}
