@@ -1,5 +1,9 @@
 //! Solvers: Newton with a line search, step control, static drape, linear systems behind one trait.
 
+pub mod drape;
+pub mod engine;
 pub mod linear;
+pub mod newton;
 pub mod report;
 pub mod settings;
+pub mod step;

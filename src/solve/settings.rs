@@ -2,6 +2,7 @@
 //! the scene file and in `set_number`.
 
 use crate::error::{Error, Result};
+use crate::system::build::BuildOptions;
 
 macro_rules! settings {
     ($($(#[doc = $doc:literal])+ $field:ident: $name:literal = $default:expr, $min:expr, $max:expr, $unit:literal;)*) => {
@@ -103,4 +104,16 @@ settings! {
     air_lift: "air.tangential" = 0.06, 0.0, 1e3, "kg/m^3";
     /// Largest number of vertices that a garment may have.
     max_vertices: "limits.vertices" = 2e6, 3.0, 1e8, "1";
+}
+
+impl From<&Settings> for BuildOptions {
+    fn from(s: &Settings) -> Self {
+        Self {
+            seam_stiffness: s.seam_stiffness,
+            air_drag: s.air_drag,
+            air_tangential: s.air_lift,
+            self_contact: s.self_contact > 0.5,
+            self_stiffness: s.self_stiffness,
+        }
+    }
 }

@@ -3,5 +3,10 @@
 //! A [`System`](build::System) is compiled from a garment and never changes during a run; the
 //! [`State`](state::State) holds everything that the next step's bits depend on.
 
+pub mod assemble;
+pub mod bodies;
+pub mod build;
+pub mod contact;
+pub mod snapshot;
 pub mod state;
 pub mod term;

@@ -154,3 +154,22 @@ pub trait Term: Send + Sync {
         let _ = (at, state);
     }
 }
+
+impl ContactSettings {
+    /// Refuses numbers that are not finite or have a sign that cannot be.
+    pub fn check(&self) -> crate::error::Result<()> {
+        let rules = [
+            ("friction", self.friction, self.friction >= 0.0),
+            ("thickness", self.thickness, self.thickness >= 0.0),
+            ("stiffness", self.stiffness, self.stiffness > 0.0),
+        ];
+        for (name, value, fine) in rules {
+            if !(value.is_finite() && fine) {
+                return Err(crate::error::Error::argument(format!(
+                    "contact.{name} = {value} must be finite and not negative (stiffness: positive)"
+                )));
+            }
+        }
+        Ok(())
+    }
+}

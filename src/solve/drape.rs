@@ -1,0 +1,305 @@
+//! Static drape: semi-implicit steps with kinetic damping towards rest, then Newton.
+//!
+//! The equations of motion without damping are integrated by steps of one Newton correction each
+//! (Baraff and Witkin 1998); the velocities are set to zero whenever the kinetic energy has passed a
+//! maximum (Umetani et al. 2011, section 7). The step size grows while the corrections are taken in
+//! full, so that near rest the inertia fades and the iteration becomes Newton's method for the
+//! static problem.
+
+use super::engine::{Attempt, Engine, Motion};
+use super::step::Totals;
+use crate::error::{Error, Result, Status};
+use crate::math::Vec3;
+use crate::system::state::{Pin, State};
+use crate::tri::Transfer;
+
+/// When a relaxation stops.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RelaxOptions {
+    /// Largest static force on a free vertex [N].
+    pub force_tolerance: f64,
+    /// A gap of the seams below which sewing is done [m]; 0 to go on to the force tolerance.
+    pub seam_gap: f64,
+    /// Steps allowed.
+    pub max_steps: u64,
+    /// First step size [s].
+    pub first_step: f64,
+    /// Largest step size [s].
+    pub largest_step: f64,
+}
+
+/// How a relaxation ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Relaxed {
+    /// Sums.
+    pub totals: Totals,
+    /// A tolerance was met.
+    pub converged: bool,
+    /// The host asked to stop.
+    pub cancelled: bool,
+}
+
+/// Smallest step of a relaxation before it gives up [s].
+const SMALLEST_STEP: f64 = 1e-6;
+
+/// Relaxes the state towards rest. `watch(step, residual)` returns false to stop.
+pub fn relax(
+    engine: &mut Engine,
+    state: &mut State,
+    options: &RelaxOptions,
+    watch: &mut dyn FnMut(u64, f64) -> bool,
+) -> Result<Relaxed> {
+    let mut out = Relaxed { totals: Totals::default(), converged: false, cancelled: false };
+    let mut h = options.first_step;
+    let mut kinetic = [0.0; 2];
+    state.velocities.fill(Vec3::zeros());
+    while out.totals.substeps < options.max_steps {
+        let (summary, reason) = match engine.attempt(state, h, 1.0, Motion::Relax) {
+            Ok(Attempt::Accepted(summary)) => (summary, None),
+            Ok(Attempt::Rejected(reason, summary)) => (summary, Some(reason.to_owned())),
+            Err(e) if matches!(e.status, Status::NoAdmissibleState | Status::LinearSolve) => {
+                (super::newton::Summary::default(), Some(e.message))
+            }
+            Err(e) => return Err(e),
+        };
+        out.totals.newton_iterations += u64::from(summary.iterations);
+        out.totals.linear_iterations += summary.linear_iterations;
+        if let Some(reason) = reason {
+            out.totals.cut = true;
+            state.velocities.fill(Vec3::zeros());
+            kinetic = [0.0; 2];
+            h *= 0.25;
+            if h < SMALLEST_STEP {
+                // nothing lower can be found: rest up to rounding, or a dead end that is reported
+                out.totals.residual = engine.residual(state)?;
+                if !out.totals.residual.is_finite() {
+                    return Err(Error::new(Status::NoAdmissibleState, reason));
+                }
+                out.converged = out.totals.residual <= options.force_tolerance;
+                return Ok(out);
+            }
+            continue;
+        }
+        out.totals.substeps += 1;
+        out.totals.residual = summary.static_residual;
+        let energy = kinetic_energy(engine, state);
+        if energy < kinetic[0] && kinetic[0] >= kinetic[1] {
+            state.velocities.fill(Vec3::zeros());
+            kinetic = [0.0; 2];
+        } else {
+            kinetic = [energy, kinetic[0]];
+        }
+        if summary.last_length >= 1.0 {
+            h = (h * 1.3).min(options.largest_step);
+        } else if summary.last_length < 0.3 {
+            h *= 0.6;
+        }
+        if summary.static_residual <= options.force_tolerance && summary.iterations == 0
+            || (options.seam_gap > 0.0
+                && engine.system.largest_seam_gap(&state.positions) <= options.seam_gap)
+        {
+            out.converged = true;
+            return Ok(out);
+        }
+        if summary.static_residual <= options.force_tolerance
+            && engine.residual(state)? <= options.force_tolerance
+        {
+            out.totals.residual = engine.residual(state)?;
+            out.converged = true;
+            return Ok(out);
+        }
+        if !watch(out.totals.substeps, summary.static_residual) {
+            out.cancelled = true;
+            return Ok(out);
+        }
+    }
+    Ok(out)
+}
+
+fn kinetic_energy(engine: &Engine, state: &State) -> f64 {
+    state
+        .velocities
+        .iter()
+        .zip(&engine.system.cloth.masses)
+        .map(|(v, m)| 0.5 * m * v.norm_squared())
+        .sum()
+}
+
+/// A coarser version of the garment.
+pub struct Level {
+    /// Its system and solver.
+    pub engine: Engine,
+}
+
+/// What a drape aims at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plan {
+    /// Largest static force on a free vertex [N].
+    pub force_tolerance: f64,
+    /// Steps allowed in each stage.
+    pub max_steps: u64,
+}
+
+/// Part of the progress bar that each stage fills.
+const SEW: (f64, f64) = (0.0, 0.25);
+const SETTLE: (f64, f64) = (0.25, 0.6);
+const REST: (f64, f64) = (0.6, 1.0);
+
+/// A gap at which the seams count as closed [m].
+const CLOSED: f64 = 1e-3;
+
+/// Watches progress: fraction done, stage, residual; false stops.
+pub type Watch<'a> = dyn FnMut(f64, &'static str, f64) -> bool + 'a;
+
+/// Sews (if the garment is `flat`, as placed) and drapes, coarse levels first.
+pub fn drape(
+    engine: &mut Engine,
+    state: &mut State,
+    levels: Vec<Level>,
+    flat: bool,
+    plan: &Plan,
+    watch: &mut Watch<'_>,
+) -> Result<Relaxed> {
+    let mut all = Relaxed { totals: Totals::default(), converged: false, cancelled: false };
+    let mut carried: Option<(Engine, State)> = None;
+    for level in levels {
+        let mut coarse = level.engine;
+        let mut coarse_state = coarse_state(&coarse, engine, state);
+        match &carried {
+            Some((from, positions)) => transfer(from, positions, &coarse, &mut coarse_state)?,
+            None => {
+                if !sew(&mut coarse, &mut coarse_state, plan, &mut all, watch)? {
+                    return Ok(all);
+                }
+            }
+        }
+        let options = settle_options(plan, 100.0 * plan.force_tolerance);
+        let done = stage(&mut coarse, &mut coarse_state, &options, SETTLE, "settle", &mut all, watch)?;
+        if done.cancelled {
+            return Ok(all);
+        }
+        carried = Some((coarse, coarse_state));
+    }
+    match &carried {
+        Some((from, positions)) => transfer(from, positions, engine, state)?,
+        None if flat => {
+            if !sew(engine, state, plan, &mut all, watch)? {
+                return Ok(all);
+            }
+        }
+        None => {}
+    }
+    let options = settle_options(plan, plan.force_tolerance);
+    let done = stage(engine, state, &options, REST, "rest", &mut all, watch)?;
+    all.converged = done.converged;
+    state.velocities.fill(Vec3::zeros());
+    Ok(all)
+}
+
+fn settle_options(plan: &Plan, force_tolerance: f64) -> RelaxOptions {
+    RelaxOptions {
+        force_tolerance,
+        seam_gap: 0.0,
+        max_steps: plan.max_steps,
+        first_step: 0.01,
+        largest_step: 10.0,
+    }
+}
+
+/// Pulls the seams together without weight and friction. False if the host stopped it.
+fn sew(
+    engine: &mut Engine,
+    state: &mut State,
+    plan: &Plan,
+    all: &mut Relaxed,
+    watch: &mut Watch<'_>,
+) -> Result<bool> {
+    if engine.system.cloth.mesh.seams.is_empty() {
+        return Ok(true);
+    }
+    let options = RelaxOptions {
+        force_tolerance: plan.force_tolerance,
+        seam_gap: CLOSED,
+        max_steps: plan.max_steps,
+        first_step: 0.01,
+        largest_step: 0.05,
+    };
+    let gravity = std::mem::replace(&mut state.gravity, Vec3::zeros());
+    let smooth = engine.system.bodies.with_friction(0.0);
+    let rough = std::mem::replace(&mut engine.system.bodies, smooth);
+    let done = stage(engine, state, &options, SEW, "sew", all, watch);
+    engine.system.bodies = rough;
+    state.gravity = gravity;
+    state.body_anchors.clear();
+    Ok(!done?.cancelled)
+}
+
+fn stage(
+    engine: &mut Engine,
+    state: &mut State,
+    options: &RelaxOptions,
+    range: (f64, f64),
+    name: &'static str,
+    all: &mut Relaxed,
+    watch: &mut Watch<'_>,
+) -> Result<Relaxed> {
+    let mut first = 0.0_f64;
+    let mut best = 0.0_f64;
+    let done = relax(engine, state, options, &mut |step, residual| {
+        first = first.max(residual);
+        // the residual falls by orders of magnitude: its logarithm is what advances evenly
+        let fall = (first / residual).ln() / (first / options.force_tolerance).ln().max(1e-3);
+        let count = step as f64 / options.max_steps as f64;
+        best = best.max(fall.max(count).clamp(0.0, 1.0));
+        watch(range.0 + (range.1 - range.0) * best, name, residual)
+    })?;
+    all.totals.substeps += done.totals.substeps;
+    all.totals.newton_iterations += done.totals.newton_iterations;
+    all.totals.linear_iterations += done.totals.linear_iterations;
+    all.totals.residual = done.totals.residual;
+    all.cancelled |= done.cancelled;
+    Ok(done)
+}
+
+/// The state of a coarse level: as placed, in the same world, held at the vertices nearest to the
+/// pins of the fine one.
+fn coarse_state(coarse: &Engine, fine: &Engine, state: &State) -> State {
+    let mesh = &coarse.system.cloth.mesh;
+    let fine_mesh = &fine.system.cloth.mesh;
+    let mut out = State {
+        positions: mesh.placed.clone(),
+        velocities: vec![Vec3::zeros(); mesh.placed.len()],
+        pins: Vec::new(),
+        body_anchors: Vec::new(),
+        pair_anchors: Vec::new(),
+        ..state.clone()
+    };
+    for pin in &state.pins {
+        let panel = fine_mesh.vertex_panel[pin.vertex as usize] as usize;
+        let uv = fine_mesh.uv[pin.vertex as usize];
+        let nearest = (mesh.panel_starts[panel]..mesh.panel_starts[panel + 1]).min_by(|a, b| {
+            let d = |v: &u32| (mesh.uv[*v as usize] - uv).norm_squared();
+            d(a).total_cmp(&d(b))
+        });
+        if let Some(vertex) = nearest {
+            // the vertex may stand a little beside the pin: it keeps that offset
+            let offset = mesh.placed[vertex as usize] - fine_mesh.placed[pin.vertex as usize];
+            let target = pin.target + offset;
+            if let Err(i) = out.pins.binary_search_by_key(&vertex, |p| p.vertex) {
+                out.pins.insert(i, Pin { vertex, target });
+            }
+        }
+    }
+    out
+}
+
+/// Carries positions to a finer level.
+fn transfer(from: &Engine, positions: &State, to: &Engine, state: &mut State) -> Result<()> {
+    let (coarse, fine) = (&from.system.cloth.mesh, &to.system.cloth.mesh);
+    let map = Transfer::new(coarse, fine)?;
+    state.positions = map.apply(&coarse.triangles, &positions.positions);
+    state.velocities.fill(Vec3::zeros());
+    state.body_anchors.clear();
+    state.pair_anchors.clear();
+    Ok(())
+}

@@ -1,0 +1,327 @@
+//! One compiled system with what is needed to advance it: terms, matrix, linear solver, threads.
+
+use super::linear::LinearSolver;
+use super::newton::{Inertia, Problem, Summary, Tolerance, Work, largest};
+use super::settings::Settings;
+use crate::error::Result;
+use crate::math::Vec3;
+use crate::math::parallel::Workers;
+use crate::system::assemble::{Assembler, energy};
+use crate::system::build::System;
+use crate::system::state::State;
+use crate::system::term::{Bodies, Configuration, World};
+
+/// A system and its solver.
+pub struct Engine {
+    /// What is simulated.
+    pub system: System,
+    /// Tunables.
+    pub settings: Settings,
+    assembler: Assembler,
+    linear: Box<dyn LinearSolver>,
+    workers: Workers,
+    work: Work,
+    weight: Vec<f64>,
+    center: Vec<Vec3>,
+    fixed: Vec<bool>,
+    start: Vec<Vec3>,
+}
+
+/// What one attempt at a substep came to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Attempt {
+    /// The state was advanced.
+    Accepted(Summary),
+    /// The state is as before; a smaller substep may do.
+    Rejected(&'static str, Summary),
+}
+
+/// How a substep moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Motion {
+    /// Backward Euler.
+    Dynamic,
+    /// Towards rest by one semi-implicit step: one Newton correction, rate terms off.
+    Relax,
+}
+
+impl Engine {
+    /// A solver for a system.
+    pub fn new(system: System, settings: &Settings) -> Self {
+        let n = system.cloth.mesh.uv.len();
+        let assembler = Assembler::new(n, &system.terms);
+        let linear = super::linear::choose::solver(
+            settings.linear_kind as u32,
+            Some(&system.seam_priorities()),
+        );
+        Self {
+            assembler,
+            linear,
+            workers: Workers::new(settings.threads as usize),
+            work: Work::default(),
+            weight: vec![0.0; n],
+            center: vec![Vec3::zeros(); n],
+            fixed: vec![false; n],
+            start: vec![Vec3::zeros(); n],
+            settings: settings.clone(),
+            system,
+        }
+    }
+
+    /// Takes changed tunables: threads and the linear solver follow at once.
+    pub fn set_settings(&mut self, settings: &Settings) {
+        if settings.threads.to_bits() != self.settings.threads.to_bits() {
+            self.workers = Workers::new(settings.threads as usize);
+        }
+        if settings.linear_kind.to_bits() != self.settings.linear_kind.to_bits() {
+            self.linear = super::linear::choose::solver(
+                settings.linear_kind as u32,
+                Some(&self.system.seam_priorities()),
+            );
+        }
+        self.settings = settings.clone();
+        self.system.set_options(&settings.into());
+        self.assembler.rebuild(self.system.cloth.mesh.uv.len(), &self.system.terms);
+    }
+
+    /// Name of the linear solver.
+    pub fn backend(&self) -> &'static str {
+        self.linear.name()
+    }
+
+    /// Bytes of the solver's factor and work arrays.
+    pub fn factor_bytes(&self) -> usize {
+        self.linear.bytes()
+    }
+
+    /// Bytes of the matrix and the scatter plans.
+    pub fn matrix_bytes(&self) -> usize {
+        self.assembler.bytes()
+    }
+
+    /// Threads.
+    pub fn workers(&self) -> &Workers {
+        &self.workers
+    }
+
+    /// Tries one substep of size `h` [s] that covers `fraction` of what is left of the bodies' and
+    /// pins' motion. A rejected or failed attempt leaves the state untouched.
+    pub fn attempt(
+        &mut self,
+        state: &mut State,
+        h: f64,
+        fraction: f64,
+        motion: Motion,
+    ) -> Result<Attempt> {
+        let n = state.positions.len();
+        let system = &mut self.system;
+        system.bodies.prepare(state, fraction)?;
+        self.start.copy_from_slice(&state.positions);
+        let dynamic = motion == Motion::Dynamic;
+        let inv_dt = if dynamic { 1.0 / h } else { 0.0 };
+        for i in 0..n {
+            let alpha = if dynamic { system.damping[i] } else { 0.0 };
+            self.weight[i] = system.cloth.masses[i] * (1.0 / (h * h) + alpha / h);
+            self.center[i] = state.positions[i] + state.velocities[i] * (h / (1.0 + alpha * h));
+        }
+        let mut x = state.positions.clone();
+        self.fixed.fill(false);
+        for pin in &state.pins {
+            let i = pin.vertex as usize;
+            self.fixed[i] = true;
+            x[i] = x[i].lerp(&pin.target, fraction);
+            if fraction >= 1.0 {
+                x[i] = pin.target;
+            }
+            self.center[i] = x[i];
+        }
+        let world = World {
+            gravity: state.gravity,
+            wind: state.wind,
+            pressure: state.pressure,
+            bodies: &system.bodies,
+        };
+        {
+            let at = Configuration { x: &self.start, x0: &self.start, inv_dt, world: &world };
+            let mut changed = false;
+            for term in &mut system.terms {
+                changed |= term.begin_step(state, &at);
+            }
+            if changed {
+                self.assembler.rebuild(n, &system.terms);
+            }
+        }
+        let problem = Problem {
+            terms: &system.terms,
+            world: &world,
+            x0: &self.start,
+            inv_dt,
+            inertia: Inertia { weight: &self.weight, center: &self.center },
+            fixed: &self.fixed,
+            workers: &self.workers,
+        };
+        let tolerance = Tolerance {
+            displacement: if dynamic { self.settings.newton_velocity_tolerance * h } else { 0.0 },
+            force: 0.0,
+            iterations: match motion {
+                Motion::Dynamic => self.settings.newton_max_iterations as u32,
+                Motion::Relax => 1,
+            },
+            linear: self.settings.linear_tolerance,
+        };
+        let summary = problem.minimise(
+            &mut x,
+            &tolerance,
+            &mut self.assembler,
+            self.linear.as_mut(),
+            &mut self.work,
+        )?;
+        let refused = if dynamic && !summary.converged {
+            Some("Newton's method did not converge")
+        } else if !dynamic && summary.last_length == 0.0 {
+            Some("the line search found no decrease")
+        } else {
+            inadmissible(system, &self.start, &x, dynamic)
+        };
+        if let Some(reason) = refused {
+            return Ok(Attempt::Rejected(reason, summary));
+        }
+        let at = Configuration { x: &x, x0: &self.start, inv_dt, world: &world };
+        // accept: lagged data first, while the step's configuration stands
+        let mut terms = std::mem::take(&mut system.terms);
+        for term in &mut terms {
+            term.accept(&at, state);
+        }
+        system.terms = terms;
+        for i in 0..n {
+            state.velocities[i] = (x[i] - self.start[i]) / h;
+        }
+        state.positions = x;
+        system.bodies.accept(state);
+        Ok(Attempt::Accepted(summary))
+    }
+
+    /// Sum of all energies of the present state [J].
+    pub fn potential_energy(&mut self, state: &State) -> Result<f64> {
+        self.with_present(state, |engine, at| {
+            energy(&engine.system.terms, at, &engine.workers)
+        })
+    }
+
+    /// Energy of each term of the present state [J], by term name.
+    pub fn energies(&mut self, state: &State) -> Result<Vec<(&'static str, f64)>> {
+        self.with_present(state, |engine, at| {
+            let terms = &engine.system.terms;
+            (0..terms.len())
+                .map(|t| (terms[t].name(), energy(&terms[t..=t], at, &engine.workers)))
+                .collect()
+        })
+    }
+
+    /// Gradient of the potential in the present state [N], pinned vertices included.
+    pub fn forces(&mut self, state: &State) -> Result<Vec<Vec3>> {
+        self.with_present(state, |engine, at| {
+            let mut gradient = vec![Vec3::zeros(); at.x.len()];
+            engine.assembler.add(
+                &engine.system.terms,
+                at,
+                None,
+                &engine.workers,
+                &mut gradient,
+            );
+            gradient
+        })
+    }
+
+    /// Largest static residual of a free vertex [N].
+    pub fn residual(&mut self, state: &State) -> Result<f64> {
+        let mut forces = self.forces(state)?;
+        for pin in &state.pins {
+            forces[pin.vertex as usize].fill(0.0);
+        }
+        Ok(largest(&forces))
+    }
+
+    fn with_present<R>(
+        &mut self,
+        state: &State,
+        f: impl FnOnce(&mut Self, &Configuration<'_>) -> R,
+    ) -> Result<R> {
+        let mut still = state.clone();
+        for body in &mut still.bodies {
+            body.target = body.pose;
+            body.target_vertices.clear();
+        }
+        self.system.bodies.prepare(&still, 1.0)?;
+        let bodies = self.system.bodies.clone();
+        let world = World {
+            gravity: state.gravity,
+            wind: state.wind,
+            pressure: state.pressure,
+            bodies: &bodies,
+        };
+        let at = Configuration {
+            x: &state.positions,
+            x0: &state.positions,
+            inv_dt: 0.0,
+            world: &world,
+        };
+        let mut changed = false;
+        for term in &mut self.system.terms {
+            changed |= term.begin_step(state, &at);
+        }
+        if changed {
+            self.assembler.rebuild(state.positions.len(), &self.system.terms);
+        }
+        Ok(f(self, &at))
+    }
+
+    /// Force and torque of the cloth on a body about the body's origin [N], [N m].
+    pub fn body_wrench(&mut self, state: &State, body: usize) -> Result<(Vec3, Vec3)> {
+        let origin = state.bodies[body].pose.position;
+        self.with_present(state, |engine, at| {
+            let areas = &engine.system.cloth.vertex_areas;
+            let (mut force, mut torque) = (Vec3::zeros(), Vec3::zeros());
+            for anchor in state.body_anchors.iter().filter(|a| a.body as usize == body) {
+                let i = anchor.vertex as usize;
+                let contact = at.world.bodies.contact(body);
+                let d = at.world.bodies.distance(body, &at.x[i]);
+                let depth = (contact.thickness - d.value).max(0.0);
+                let k = contact.stiffness * areas[i];
+                let normal = d.gradient;
+                let offset = at.x[i] - anchor.point;
+                let slide = offset - normal * normal.dot(&offset);
+                let f = slide * k - normal * (k * depth);
+                force += f;
+                torque += (at.x[i] - origin).cross(&f);
+            }
+            (force, torque)
+        })
+    }
+}
+
+/// Why a converged substep may still not stand.
+fn inadmissible(
+    system: &System,
+    start: &[Vec3],
+    x: &[Vec3],
+    dynamic: bool,
+) -> Option<&'static str> {
+    let bodies = &system.bodies;
+    for b in 0..bodies.count() {
+        let limit = system.depth_limit(b);
+        for (x0, x1) in start.iter().zip(x) {
+            let end = bodies.value(b, x1);
+            if end < -limit && bodies.value_at_start(b, x0) > -limit {
+                return Some("a vertex went too deep into a body");
+            }
+            if bodies.passes_through(b, x0, x1, limit) {
+                return Some("a vertex passed through a body");
+            }
+        }
+    }
+    if dynamic && system.largest_stretch_change(start, x) > 0.2 {
+        return Some("an edge changed its length too much");
+    }
+    None
+}

@@ -1,0 +1,231 @@
+//! Newton's method with a line search on the incremental potential of one substep.
+//!
+//! ```text
+//! Phi(x) = sum_i w_i/2 |x_i - xhat_i|^2 + V(x),   w_i = m_i (1/h^2 + alpha/h)
+//! ```
+//!
+//! Backward Euler is the stationary point for `xhat = x0 + h v0 / (1 + alpha h)`; a static relaxation
+//! uses the same with `v0 = 0`. No step is accepted that raises `Phi`.
+
+use super::linear::{LinearError, LinearSolver};
+use crate::error::{Error, Result, Status};
+use crate::math::Vec3;
+use crate::math::block::BlockMatrix;
+use crate::math::parallel::Workers;
+use crate::system::assemble::{Assembler, energy, fix_rows};
+use crate::system::term::{Configuration, HessianKind, Term, World};
+
+/// The quadratic part of the incremental potential.
+pub struct Inertia<'a> {
+    /// Weight of each vertex [N/m].
+    pub weight: &'a [f64],
+    /// Where the quadratic part is least [m].
+    pub center: &'a [Vec3],
+}
+
+/// When to stop.
+#[derive(Clone, Copy, Debug)]
+pub struct Tolerance {
+    /// Largest correction of a coordinate's vertex [m].
+    pub displacement: f64,
+    /// Largest force on a free vertex [N].
+    pub force: f64,
+    /// Newton iterations.
+    pub iterations: u32,
+    /// Relative residual of the linear solver.
+    pub linear: f64,
+}
+
+/// How a solve ended.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Summary {
+    /// Whether a tolerance was met.
+    pub converged: bool,
+    /// Newton iterations.
+    pub iterations: u32,
+    /// Linear iterations.
+    pub linear_iterations: u64,
+    /// Largest force on a free vertex when it was last evaluated [N].
+    pub residual: f64,
+    /// The same before the first correction, without the quadratic part: the static residual of
+    /// the start [N].
+    pub static_residual: f64,
+    /// Length of the last line search, 1 for a full step, 0 if none was found.
+    pub last_length: f64,
+}
+
+/// What a Newton solve works on and with.
+pub struct Problem<'a> {
+    /// Energies.
+    pub terms: &'a [Box<dyn Term>],
+    /// World at the end of the substep.
+    pub world: &'a World<'a>,
+    /// Start of the substep [m].
+    pub x0: &'a [Vec3],
+    /// One over the substep size [1/s], 0 in statics.
+    pub inv_dt: f64,
+    /// Quadratic part.
+    pub inertia: Inertia<'a>,
+    /// Vertices that keep their place.
+    pub fixed: &'a [bool],
+    /// Threads.
+    pub workers: &'a Workers,
+}
+
+/// Vectors that live as long as the solver does.
+#[derive(Debug, Default)]
+pub struct Work {
+    gradient: Vec<Vec3>,
+    negative: Vec<Vec3>,
+    direction: Vec<Vec3>,
+    trial: Vec<Vec3>,
+}
+
+impl Problem<'_> {
+    fn at<'b>(&'b self, x: &'b [Vec3]) -> Configuration<'b> {
+        Configuration { x, x0: self.x0, inv_dt: self.inv_dt, world: self.world }
+    }
+
+    fn value(&self, x: &[Vec3]) -> f64 {
+        let inertia = self.workers.sum(x.len(), |i| {
+            0.5 * self.inertia.weight[i] * (x[i] - self.inertia.center[i]).norm_squared()
+        });
+        inertia + energy(self.terms, &self.at(x), self.workers)
+    }
+
+    fn derivatives(
+        &self,
+        x: &[Vec3],
+        kind: HessianKind,
+        assembler: &mut Assembler,
+        gradient: &mut [Vec3],
+    ) -> f64 {
+        gradient.fill(Vec3::zeros());
+        let matrix: &mut BlockMatrix = assembler.matrix_mut();
+        for block in &mut matrix.blocks {
+            block.fill(0.0);
+        }
+        for (i, w) in self.inertia.weight.iter().enumerate() {
+            let slot = matrix.pattern.starts[i] as usize;
+            for d in 0..3 {
+                matrix.blocks[slot][(d, d)] = *w;
+            }
+        }
+        assembler.add(self.terms, &self.at(x), Some(kind), self.workers, gradient);
+        fix_rows(assembler.matrix_mut(), self.fixed);
+        for (g, fixed) in gradient.iter_mut().zip(self.fixed) {
+            if *fixed {
+                g.fill(0.0);
+            }
+        }
+        let residual = largest(gradient);
+        for (i, g) in gradient.iter_mut().enumerate() {
+            if !self.fixed[i] {
+                *g += (x[i] - self.inertia.center[i]) * self.inertia.weight[i];
+            }
+        }
+        residual
+    }
+
+    /// Minimises `Phi` from `x`, which holds the best admissible point on return.
+    pub fn minimise(
+        &self,
+        x: &mut [Vec3],
+        tolerance: &Tolerance,
+        assembler: &mut Assembler,
+        linear: &mut dyn LinearSolver,
+        work: &mut Work,
+    ) -> Result<Summary> {
+        let n = x.len();
+        for v in [&mut work.gradient, &mut work.negative, &mut work.direction, &mut work.trial] {
+            v.resize(n, Vec3::zeros());
+        }
+        let mut summary = Summary::default();
+        let mut value = self.value(x);
+        if !value.is_finite() {
+            return Err(not_finite("energy"));
+        }
+        for iteration in 0..tolerance.iterations {
+            let still = self.derivatives(x, HessianKind::Psd, assembler, &mut work.gradient);
+            summary.residual = largest(&work.gradient);
+            if iteration == 0 {
+                summary.static_residual = still;
+            }
+            if !summary.residual.is_finite() {
+                return Err(not_finite("force"));
+            }
+            if summary.residual <= tolerance.force {
+                summary.converged = true;
+                return Ok(summary);
+            }
+            summary.iterations += 1;
+            for (m, g) in work.negative.iter_mut().zip(&work.gradient) {
+                *m = -g;
+            }
+            let matrix = assembler.matrix();
+            summary.linear_iterations += u64::from(
+                linear
+                    .prepare(matrix)
+                    .and_then(|()| {
+                        linear.solve(matrix, &work.negative, &mut work.direction, tolerance.linear)
+                    })
+                    .map_err(linear_error)?,
+            );
+            let slope: f64 = dot(&work.gradient, &work.direction);
+            let reach = largest(&work.direction);
+            if !slope.is_finite() || !reach.is_finite() {
+                return Err(not_finite("Newton correction"));
+            }
+            // below the rounding of the energy a decrease cannot be seen: trust the correction
+            let noise = 1e-13 * value.abs().max(1e-12);
+            let mut length = 1.0;
+            loop {
+                for i in 0..n {
+                    work.trial[i] = x[i] + work.direction[i] * length;
+                }
+                let trial = self.value(&work.trial);
+                if trial <= value + 1e-4 * length * slope + noise {
+                    x.copy_from_slice(&work.trial);
+                    value = trial;
+                    break;
+                }
+                length *= 0.5;
+                if length < 1e-8 {
+                    length = 0.0;
+                    break;
+                }
+            }
+            summary.last_length = length;
+            if length == 0.0 {
+                return Ok(summary);
+            }
+            if length * reach <= tolerance.displacement {
+                summary.converged = true;
+                return Ok(summary);
+            }
+        }
+        Ok(summary)
+    }
+}
+
+/// Largest Euclidean norm [same unit].
+pub fn largest(v: &[Vec3]) -> f64 {
+    // max would swallow a NaN
+    v.iter().map(Vec3::norm_squared).fold(0.0, |a: f64, b| if b > a || b.is_nan() { b } else { a }).sqrt()
+}
+
+fn dot(a: &[Vec3], b: &[Vec3]) -> f64 {
+    a.iter().zip(b).map(|(p, q)| p.dot(q)).sum()
+}
+
+fn not_finite(what: &str) -> Error {
+    Error::new(Status::NoAdmissibleState, format!("{what} is not finite"))
+}
+
+fn linear_error(error: LinearError) -> Error {
+    let text = match error {
+        LinearError::NotPositiveDefinite => "the matrix of a Newton step is not positive definite",
+        LinearError::NoConvergence => "the linear solver did not converge",
+    };
+    Error::new(Status::LinearSolve, text)
+}

@@ -1,0 +1,82 @@
+//! `step(dt)`: substeps of backward Euler whose size follows contact, strain and Newton's method.
+
+use super::engine::{Attempt, Engine, Motion};
+use crate::error::{Error, Result, Status};
+use crate::system::state::State;
+
+/// Sums over the substeps of one step or drape.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Totals {
+    /// Accepted substeps.
+    pub substeps: u64,
+    /// Newton iterations, rejected substeps included.
+    pub newton_iterations: u64,
+    /// Linear iterations.
+    pub linear_iterations: u64,
+    /// Residual of the last solve [N].
+    pub residual: f64,
+    /// Whether a substep had to be cut.
+    pub cut: bool,
+}
+
+/// Advances the state by exactly `dt` [s], or returns an error with the state untouched.
+pub fn step(engine: &mut Engine, state: &mut State, dt: f64) -> Result<Totals> {
+    let saved = state.clone();
+    advance(engine, state, dt).inspect_err(|_| state.clone_from(&saved))
+}
+
+fn advance(engine: &mut Engine, state: &mut State, dt: f64) -> Result<Totals> {
+    let end = state.time + dt;
+    let start = state.time;
+    let (min, max) = (engine.settings.min_step, engine.settings.max_step);
+    let mut totals = Totals::default();
+    let mut remaining = dt;
+    while remaining > 0.0 {
+        let slices = (remaining / state.step_size.min(max)).ceil().max(1.0);
+        let h = remaining / slices;
+        let attempt = engine.attempt(state, h, 1.0 / slices, Motion::Dynamic);
+        let reason = match attempt {
+            Ok(Attempt::Accepted(summary)) => {
+                add(&mut totals, &summary);
+                totals.substeps += 1;
+                remaining = if slices <= 1.0 { 0.0 } else { remaining - h };
+                state.time = end - remaining;
+                if summary.iterations <= 8 {
+                    state.step_size = state.step_size.max(1.5 * h);
+                }
+                continue;
+            }
+            Ok(Attempt::Rejected(reason, summary)) => {
+                add(&mut totals, &summary);
+                reason.to_owned()
+            }
+            Err(error) if matches!(error.status, Status::NoAdmissibleState | Status::LinearSolve) => {
+                error.message
+            }
+            Err(error) => return Err(error),
+        };
+        totals.cut = true;
+        state.step_size = 0.5 * h;
+        if state.step_size < min {
+            return Err(Error::new(
+                Status::NoAdmissibleState,
+                format!(
+                    "no admissible state at time {:.9} s (step from {start:.9} s by {dt} s): {reason}, \
+                     even with a substep of {h:.3e} s (solver.step.min = {min:.3e} s)",
+                    state.time
+                ),
+            ));
+        }
+    }
+    state.time = end;
+    for body in &mut state.bodies {
+        body.moved_with_time = true;
+    }
+    Ok(totals)
+}
+
+fn add(totals: &mut Totals, summary: &super::newton::Summary) {
+    totals.newton_iterations += u64::from(summary.iterations);
+    totals.linear_iterations += summary.linear_iterations;
+    totals.residual = summary.residual;
+}

@@ -1,0 +1,164 @@
+//! The only place that sees all terms: builds the ones that a garment and its fabrics call for.
+
+use super::bodies::BodySet;
+use super::contact::body::BodyContact;
+use super::term::{Bodies, Term};
+use crate::cloth::Cloth;
+use crate::math::Vec3;
+use crate::pattern::BendingModel;
+
+/// A compiled garment.
+pub struct System {
+    /// Rest data.
+    pub cloth: Cloth,
+    /// Energies.
+    pub terms: Vec<Box<dyn Term>>,
+    /// Bodies of the world.
+    pub bodies: BodySet,
+    /// Mesh edges, each once, smaller vertex first.
+    pub edges: Vec<[u32; 2]>,
+    /// Their rest lengths [m].
+    pub rest_lengths: Vec<f64>,
+    /// Mass-proportional damping of each vertex [1/s].
+    pub damping: Vec<f64>,
+    options: BuildOptions,
+}
+
+/// What decides which terms are built.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BuildOptions {
+    /// Seam stiffness per length [N/m^2].
+    pub seam_stiffness: f64,
+    /// Normal drag [kg/m^3].
+    pub air_drag: f64,
+    /// Tangential drag [kg/m^3].
+    pub air_tangential: f64,
+    /// Cloth against cloth.
+    pub self_contact: bool,
+    /// Its stiffness [Pa/m].
+    pub self_stiffness: f64,
+}
+
+impl System {
+    /// Compiles rest data; bodies come later.
+    pub fn new(cloth: Cloth, options: &BuildOptions) -> Self {
+        let terms = terms(&cloth, options);
+        let edges = unique_edges(&cloth.mesh.triangles);
+        let rest_lengths = edges
+            .iter()
+            .map(|e| (cloth.mesh.uv[e[1] as usize] - cloth.mesh.uv[e[0] as usize]).norm())
+            .collect();
+        let mut damping = vec![0.0; cloth.mesh.uv.len()];
+        for (d, panel) in damping.iter_mut().zip(&cloth.mesh.vertex_panel) {
+            *d = cloth.fabrics[cloth.panel_fabric[*panel as usize]].damping_mass;
+        }
+        Self {
+            cloth,
+            terms,
+            bodies: BodySet::default(),
+            edges,
+            rest_lengths,
+            damping,
+            options: options.clone(),
+        }
+    }
+
+    /// Takes changed options; terms that carry them are built anew.
+    pub fn set_options(&mut self, options: &BuildOptions) {
+        if *options != self.options {
+            self.options = options.clone();
+            self.terms = terms(&self.cloth, options);
+        }
+    }
+
+    /// Bytes of the mesh and of the rest data, terms not counted.
+    pub fn bytes(&self) -> usize {
+        let n = self.cloth.mesh.uv.len();
+        n * (16 + 24 + 4 + 8 + 8 + 8) + self.cloth.mesh.triangles.len() * 24 + self.edges.len() * 16
+    }
+
+    /// How deep a vertex may be in a body after an accepted substep [m].
+    pub fn depth_limit(&self, body: usize) -> f64 {
+        (2.0 * self.bodies.contact(body).thickness).max(4e-3)
+    }
+
+    /// Priority of each vertex in an incomplete factorization: emitting seam vertices 2, receiving
+    /// ones 1, all others 0 (Umetani et al. 2011, section 7).
+    pub fn seam_priorities(&self) -> Vec<u8> {
+        let mut priority = vec![0; self.cloth.mesh.uv.len()];
+        for link in self.cloth.mesh.seams.iter().flat_map(|s| &s.links) {
+            for v in link.edge {
+                priority[v as usize] = priority[v as usize].max(1);
+            }
+        }
+        for link in self.cloth.mesh.seams.iter().flat_map(|s| &s.links) {
+            priority[link.vertex as usize] = 2;
+        }
+        priority
+    }
+
+    /// Largest change of an edge's relative length between two configurations.
+    pub fn largest_stretch_change(&self, start: &[Vec3], x: &[Vec3]) -> f64 {
+        self.edges
+            .iter()
+            .zip(&self.rest_lengths)
+            .map(|(e, rest)| {
+                let [a, b] = e.map(|v| v as usize);
+                ((x[b] - x[a]).norm() - (start[b] - start[a]).norm()).abs() / rest
+            })
+            .fold(0.0, f64::max)
+    }
+
+    /// Largest relative stretch (or shortening, as a positive number, is not counted) of an edge.
+    pub fn largest_strain(&self, x: &[Vec3]) -> f64 {
+        self.edges
+            .iter()
+            .zip(&self.rest_lengths)
+            .map(|(e, rest)| (x[e[1] as usize] - x[e[0] as usize]).norm() / rest - 1.0)
+            .fold(0.0, f64::max)
+    }
+
+    /// Largest distance between the two points of a seam link [m].
+    pub fn largest_seam_gap(&self, x: &[Vec3]) -> f64 {
+        self.cloth
+            .mesh
+            .seams
+            .iter()
+            .flat_map(|s| &s.links)
+            .map(|l| {
+                let [a, b] = l.edge.map(|v| x[v as usize]);
+                (x[l.vertex as usize] - a.lerp(&b, l.t)).norm()
+            })
+            .fold(0.0, f64::max)
+    }
+
+    /// Smallest signed distance of a vertex to a body [m], infinite without bodies.
+    pub fn smallest_gap(&self, x: &[Vec3]) -> f64 {
+        let mut gap = f64::INFINITY;
+        for b in 0..self.bodies.count() {
+            for p in x {
+                gap = gap.min(self.bodies.value(b, p));
+            }
+        }
+        gap
+    }
+}
+
+fn terms(cloth: &Cloth, options: &BuildOptions) -> Vec<Box<dyn Term>> {
+    let mut terms: Vec<Box<dyn Term>> = Vec::new();
+    terms.push(Box::new(BodyContact::new(cloth)));
+    let _ = (options, BendingModel::Hinge);
+    terms
+}
+
+/// Edges of a triangle list, each once, smaller vertex first, sorted.
+pub fn unique_edges(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
+    let mut edges: Vec<[u32; 2]> = triangles
+        .iter()
+        .flat_map(|t| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]])
+        .map(|[a, b]| [a.min(b), a.max(b)])
+        .collect();
+    edges.sort_unstable();
+    edges.dedup();
+    edges
+}

@@ -1,0 +1,3 @@
+//! Contact: cloth against bodies.
+
+pub mod body;
