@@ -1,5 +1,6 @@
 //! Triangulation of real patterns: quality, size, area, seams.
 
+#[path = "common_data/mod.rs"]
 mod common_data;
 
 use common_data::data_dir;

@@ -185,26 +185,22 @@ impl Segment {
         self.length_between(0.0, 1.0)
     }
 
-    /// Parameters that cut the curve into `pieces` (at least 1) equal arc lengths, ends included.
-    pub fn equal_parameters(&self, pieces: usize) -> Vec<f64> {
-        let pieces = pieces.max(1);
-        let even = |k: usize| k as f64 / pieces as f64;
-        if matches!(self.curve, Curve::Line | Curve::Arc { .. }) || pieces == 1 {
-            return (0..=pieces).map(even).collect();
+    /// Parameters at these fractions (0 to 1) of the arc length.
+    pub fn parameters_at(&self, fractions: &[f64]) -> Vec<f64> {
+        if matches!(self.curve, Curve::Line | Curve::Arc { .. }) {
+            return fractions.to_vec();
         }
         let mut table = [0.0; TABLE + 1];
         for k in 0..TABLE {
             let (a, b) = (k as f64 / TABLE as f64, (k + 1) as f64 / TABLE as f64);
             table[k + 1] = table[k] + self.length_between(a, b);
         }
-        let total = table[TABLE];
-        let mut parameters = Vec::with_capacity(pieces + 1);
-        parameters.push(0.0);
-        for k in 1..pieces {
-            parameters.push(self.invert(&table, total * even(k)));
-        }
-        parameters.push(1.0);
-        parameters
+        let invert = |fraction: &f64| match *fraction {
+            f if f <= 0.0 => 0.0,
+            f if f >= 1.0 => 1.0,
+            f => self.invert(&table, table[TABLE] * f),
+        };
+        fractions.iter().map(invert).collect()
     }
 
     /// Parameter where the arc length from the start is `target`, by Newton inside a bracket.
@@ -241,19 +237,25 @@ impl Segment {
         t
     }
 
-    /// `pieces + 1` points at equal steps of arc length; both ends are met exactly.
-    pub fn sample(&self, pieces: usize) -> Vec<Vec2> {
-        let parameters = self.equal_parameters(pieces);
-        let last = parameters.len() - 1;
-        parameters
+    /// Points at these fractions of the arc length; 0 and 1 give the ends exactly.
+    pub fn points_at(&self, fractions: &[f64]) -> Vec<Vec2> {
+        let place = |(fraction, t): (&f64, f64)| match *fraction {
+            f if f <= 0.0 => self.start,
+            f if f >= 1.0 => self.end,
+            _ => self.point(t),
+        };
+        fractions
             .iter()
-            .enumerate()
-            .map(|(k, t)| match k {
-                0 => self.start,
-                k if k == last => self.end,
-                _ => self.point(*t),
-            })
+            .zip(self.parameters_at(fractions))
+            .map(place)
             .collect()
+    }
+
+    /// `pieces + 1` points (at least 2) at equal steps of arc length, ends included.
+    pub fn sample(&self, pieces: usize) -> Vec<Vec2> {
+        let pieces = pieces.max(1);
+        let even: Vec<f64> = (0..=pieces).map(|k| k as f64 / pieces as f64).collect();
+        self.points_at(&even)
     }
 
     /// Upper bound of the angle [rad] through which the tangent turns in all; exact for arcs.
@@ -490,7 +492,8 @@ mod tests {
     fn samples_are_at_equal_arc_length() {
         for segment in all() {
             let n = 37;
-            let parameters = segment.equal_parameters(n);
+            let even: Vec<f64> = (0..=n).map(|k| k as f64 / n as f64).collect();
+            let parameters = segment.parameters_at(&even);
             let step = segment.length() / n as f64;
             for w in parameters.windows(2) {
                 let error = (segment.length_between(w[0], w[1]) / step - 1.0).abs();

@@ -7,8 +7,8 @@
 //! triangles pinched between two pieces of it, stay as they are. Where refinement does not end, the
 //! angle limit is lowered in steps; a mesh whose area differs from its polygon's is refused.
 
-use super::boundary::{edge_counts, refine_panel};
-use super::seam::link;
+use super::boundary::edge_fractions;
+use super::seam::{Side, link};
 use super::{GarmentMesh, SeamMesh, quality};
 use crate::error::{Error, Result};
 use crate::math::Vec2;
@@ -72,7 +72,14 @@ pub fn triangulate(
         .iter()
         .map(Panel::segments)
         .collect::<Result<_>>()?;
-    let mut counts = edge_counts(garment, &segments, edge_length_scale, max_vertices)?;
+    let targets: Vec<f64> = garment
+        .panels
+        .iter()
+        .map(|panel| edge_length_scale * garment.panel_edge_length(panel))
+        .collect();
+    // outlines may need finer cuts than the cloth: these shrink on a retry
+    let mut cuts = targets.clone();
+    let mut fractions = edge_fractions(garment, &segments, &cuts, max_vertices)?;
     let mut meshes: Vec<Option<PanelMesh>> = garment.panels.iter().map(|_| None).collect();
     let mut retries = vec![0; garment.panels.len()];
     let mut next = 0;
@@ -81,9 +88,9 @@ pub fn triangulate(
             next += 1;
             continue;
         }
-        let h = edge_length_scale * garment.panel_edge_length(panel);
         let place = |e: Error| e.at(format!("panel '{}'", panel.name));
-        match mesh_panel(panel, &segments[next], &counts[next], h, max_vertices) {
+        let h = targets[next];
+        match mesh_panel(panel, &segments[next], &fractions[next], h, max_vertices) {
             Ok(mesh) => meshes[next] = Some(mesh),
             Err(Failure::Final(error)) => return Err(place(error)),
             Err(Failure::Outline(error)) => {
@@ -91,26 +98,28 @@ pub fn triangulate(
                 if retries[next] > RETRIES {
                     return Err(place(error));
                 }
-                // seams carry the new counts to panels already meshed: mesh those again
-                let before = counts.clone();
-                refine_panel(garment, &mut counts, next);
+                cuts[next] *= 0.5;
+                let finer = edge_fractions(garment, &segments, &cuts, max_vertices)?;
+                // seams carry the new cuts to panels already meshed: mesh those again
                 for (k, mesh) in meshes.iter_mut().enumerate() {
-                    if counts[k] != before[k] {
+                    if finer[k] != fractions[k] {
                         *mesh = None;
                     }
                 }
+                fractions = finer;
                 next = 0;
             }
         }
     }
     let meshes: Vec<PanelMesh> = meshes.into_iter().flatten().collect();
-    join(garment, &segments, meshes, max_vertices)
+    join(garment, &segments, &fractions, meshes, max_vertices)
 }
 
 /// Puts the panels' meshes after one another, orients, places and sews them.
 fn join(
     garment: &Garment,
     segments: &[Vec<Segment>],
+    fractions: &[Vec<Vec<f64>>],
     meshes: Vec<PanelMesh>,
     max_vertices: usize,
 ) -> Result<GarmentMesh> {
@@ -152,11 +161,22 @@ fn join(
         let side = |e: crate::pattern::EdgeRef| (e.panel as usize, e.edge as usize);
         let ((pa, ea), (pb, eb)) = (side(seam.a), side(seam.b));
         let length = 0.5 * (segments[pa][ea].length() + segments[pb][eb].length());
+        let mut vertices = mesh.edge_vertices[pb][eb].clone();
+        let mut cut = fractions[pb][eb].clone();
+        if !seam.same_direction {
+            vertices.reverse();
+            cut = cut.iter().rev().map(|x| 1.0 - x).collect();
+        }
         mesh.seams.push(SeamMesh {
             links: link(
-                &mesh.edge_vertices[pa][ea],
-                &mesh.edge_vertices[pb][eb],
-                seam.same_direction,
+                Side {
+                    vertices: &mesh.edge_vertices[pa][ea],
+                    fractions: &fractions[pa][ea],
+                },
+                Side {
+                    vertices: &vertices,
+                    fractions: &cut,
+                },
                 length,
             ),
             rest_angle: seam.rest_angle,
@@ -170,7 +190,7 @@ fn join(
 fn mesh_panel(
     panel: &Panel,
     segments: &[Segment],
-    counts: &[usize],
+    fractions: &[Vec<f64>],
     h: f64,
     max_vertices: usize,
 ) -> std::result::Result<PanelMesh, Failure> {
@@ -179,7 +199,7 @@ fn mesh_panel(
     for range in panel.loops() {
         let first = points.len() as u32;
         for k in range.clone() {
-            let sampled = segments[k].sample(counts[k]);
+            let sampled = segments[k].points_at(&fractions[k]);
             let start = points.len() as u32;
             points.extend(&sampled[..sampled.len() - 1]);
             let mut list: Vec<u32> = (start..points.len() as u32).collect();

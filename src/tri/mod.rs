@@ -25,8 +25,9 @@ pub struct GarmentMesh {
     pub triangles: Vec<[u32; 3]>,
     /// Panel of each triangle.
     pub triangle_panel: Vec<u32>,
-    /// `edge_vertices[panel][edge]`: vertices along that edge from its start to its end, at equal
-    /// steps of the edge's arc length.
+    /// `edge_vertices[panel][edge]`: vertices along that edge from its start to its end. The two
+    /// edges of a seam are cut at the same fractions of arc length: equal steps, graded where a
+    /// shorter or finer edge is near.
     pub edge_vertices: Vec<Vec<Vec<u32>>>,
     /// One entry for each seam of the garment.
     pub seams: Vec<SeamMesh>,

@@ -1,9 +1,9 @@
 //! Ties between the two sides of a seam.
 //!
-//! Both sides are cut at equal steps of arc length. Every vertex of side a is tied to the point of
-//! side b at the same fraction of arc length (run backwards unless `same_direction`). Where the
-//! counts differ, the vertices of b that meet no vertex of a are tied to a in turn. A tie stands for
-//! half of the seam to each side of it (trapezoid rule), so the lengths sum to the seam's.
+//! Every vertex of side a is tied to the point of side b at the same fraction of arc length (run
+//! backwards unless the seam has the same direction). Vertices of b that meet no vertex of a are tied
+//! to a in turn. A tie stands for half of the seam to each side of it (trapezoid rule), so the
+//! lengths sum to the seam's.
 //!
 //! A dart's two edges share the corner at its tip: that corner would be tied to itself. It is left
 //! out and its length goes to the tie beside it.
@@ -13,73 +13,75 @@ use super::SeamLink;
 /// Fractions nearer than this are the same point.
 const SAME: f64 = 1e-9;
 
-/// A tie before its length is known: fraction along a, and the tie.
-type Raw = (f64, SeamLink);
+/// One side of a seam: vertices and their fractions of arc length, both in the seam's direction.
+#[derive(Clone, Copy, Debug)]
+pub struct Side<'a> {
+    /// Vertices, at least 2.
+    pub vertices: &'a [u32],
+    /// Fractions from 0 to 1, ascending, one for each vertex.
+    pub fractions: &'a [f64],
+}
 
-/// Ties of side a (vertices from start to end) to side b; `length` of the whole seam [m].
-pub fn link(a: &[u32], b: &[u32], same_direction: bool, length: f64) -> Vec<SeamLink> {
-    if a.len() < 2 || b.len() < 2 {
+/// Ties of side a to side b, and of what is left of b to a; `length` of the whole seam [m].
+pub fn link(a: Side<'_>, b: Side<'_>, length: f64) -> Vec<SeamLink> {
+    if a.vertices.len() < 2 || b.vertices.len() < 2 {
         return Vec::new();
     }
-    let b: Vec<u32> = if same_direction {
-        b.to_vec()
-    } else {
-        b.iter().rev().copied().collect()
-    };
-    let (na, nb) = (a.len() - 1, b.len() - 1);
-    let mut raw: Vec<Raw> = (0..=na)
-        .map(|k| (k as f64 / na as f64, tie(a[k], k, na, &b)))
-        .collect();
-    if na != nb {
-        for k in 1..nb {
-            // fractions k / nb and j / na agree exactly in integers
-            if (k * na) % nb != 0 {
-                raw.push((k as f64 / nb as f64, tie(b[k], k, nb, a)));
-            }
-        }
-        raw.sort_by(|p, q| p.0.total_cmp(&q.0).then(p.1.vertex.cmp(&q.1.vertex)));
+    let mut raw: Vec<(f64, SeamLink)> = Vec::with_capacity(a.vertices.len());
+    for (vertex, x) in a.vertices.iter().zip(a.fractions) {
+        raw.push((*x, tie(*vertex, *x, b)));
     }
-    // a corner tied to itself or to an edge that it bounds is no tie
-    let fractions: Vec<f64> = raw.iter().map(|r| r.0).collect();
+    for (vertex, x) in b.vertices.iter().zip(b.fractions) {
+        let k = a.fractions.partition_point(|y| *y < x - SAME);
+        if a.fractions.get(k).is_none_or(|y| *y > x + SAME) {
+            raw.push((*x, tie(*vertex, *x, a)));
+        }
+    }
+    raw.sort_by(|p, q| p.0.total_cmp(&q.0));
     let mut shares = vec![0.0; raw.len()];
     for k in 1..raw.len() {
-        let half = 0.5 * (fractions[k] - fractions[k - 1]);
+        let half = 0.5 * (raw[k].0 - raw[k - 1].0);
         shares[k - 1] += half;
         shares[k] += half;
     }
-    let own = |r: &Raw| r.1.edge.contains(&r.1.vertex);
+    // a corner that both sides share is no tie
+    let own = |link: &SeamLink| link.edge.contains(&link.vertex);
     let last = raw.len() - 1;
-    if own(&raw[0]) {
+    if own(&raw[0].1) {
         shares[1] += shares[0];
     }
-    if own(&raw[last]) {
+    if own(&raw[last].1) {
         shares[last - 1] += shares[last];
     }
     raw.iter()
         .zip(&shares)
-        .filter(|(r, _)| !own(r))
-        .map(|(r, share)| SeamLink {
+        .filter(|((_, link), _)| !own(link))
+        .map(|((_, link), share)| SeamLink {
             length: share * length,
-            ..r.1
+            ..*link
         })
         .collect()
 }
 
-/// Tie of `vertex` at fraction `k / n` to the side whose vertices are `other`.
-fn tie(vertex: u32, k: usize, n: usize, other: &[u32]) -> SeamLink {
-    let m = other.len() - 1;
-    // position k m / n on the other side, in pieces
-    let whole = (k * m) / n;
-    let rest = (k * m) % n;
-    let (piece, t) = if whole == m {
-        (m - 1, 1.0)
+/// Tie of `vertex` to the point of `side` at fraction `x`.
+fn tie(vertex: u32, x: f64, side: Side<'_>) -> SeamLink {
+    let pieces = side.vertices.len() - 1;
+    let k = side
+        .fractions
+        .partition_point(|y| *y <= x + SAME)
+        .clamp(1, pieces)
+        - 1;
+    let (from, to) = (side.fractions[k], side.fractions[k + 1]);
+    let t = if x <= from + SAME {
+        0.0
+    } else if x >= to - SAME {
+        1.0
     } else {
-        (whole, rest as f64 / n as f64)
+        (x - from) / (to - from)
     };
-    debug_assert!(t > SAME || rest == 0);
     SeamLink {
         vertex,
-        edge: [other[piece], other[piece + 1]],
+        edge: [side.vertices[k], side.vertices[k + 1]],
         t,
         length: 0.0,
     }
@@ -93,31 +95,45 @@ mod tests {
         links.iter().map(|l| l.length).sum()
     }
 
-    #[test]
-    fn equal_counts_tie_vertex_to_vertex() {
-        let (a, b) = ([0, 1, 2, 3], [10, 11, 12, 13]);
-        let links = link(&a, &b, false, 0.3);
-        assert_eq!(links.len(), 4);
-        for (k, l) in links.iter().enumerate() {
-            let met = l.edge[if l.t == 0.0 { 0 } else { 1 }];
-            assert!(l.t == 0.0 || l.t == 1.0);
-            assert_eq!((l.vertex, met), (a[k], b[3 - k]));
-        }
-        assert!((sum(&links) - 0.3).abs() < 1e-15);
-        assert!((links[0].length - 0.05).abs() < 1e-15);
-        let met: Vec<u32> = link(&a, &b, true, 0.3)
-            .iter()
-            .map(|l| l.edge[if l.t == 0.0 { 0 } else { 1 }])
-            .collect();
-        assert_eq!(met, b);
+    fn even(vertices: &[u32]) -> Vec<f64> {
+        let n = vertices.len() - 1;
+        (0..=n).map(|k| k as f64 / n as f64).collect()
+    }
+
+    fn tied(a: &[u32], b: &[u32], length: f64) -> Vec<SeamLink> {
+        link(
+            Side {
+                vertices: a,
+                fractions: &even(a),
+            },
+            Side {
+                vertices: b,
+                fractions: &even(b),
+            },
+            length,
+        )
     }
 
     #[test]
-    fn unequal_counts_tie_every_vertex_of_both_sides_once() {
+    fn equal_fractions_tie_vertex_to_vertex() {
+        let (a, b) = ([0, 1, 2, 3], [10, 11, 12, 13]);
+        let links = tied(&a, &b, 0.3);
+        assert_eq!(links.len(), 4);
+        for (k, l) in links.iter().enumerate() {
+            let met = l.edge[usize::from(l.t != 0.0)];
+            assert!(l.t == 0.0 || l.t == 1.0);
+            assert_eq!((l.vertex, met), (a[k], b[k]));
+        }
+        assert!((sum(&links) - 0.3).abs() < 1e-15);
+        assert!((links[0].length - 0.05).abs() < 1e-15);
+    }
+
+    #[test]
+    fn unequal_fractions_tie_every_vertex_of_both_sides() {
         for (na, nb) in [(3, 2), (2, 3), (5, 7), (6, 3), (1, 4), (4, 1)] {
             let a: Vec<u32> = (0..=na).collect();
             let b: Vec<u32> = (100..=100 + nb).collect();
-            let links = link(&a, &b, true, 2.0);
+            let links = tied(&a, &b, 2.0);
             assert!((sum(&links) - 2.0).abs() < 1e-14);
             // fraction of the vertex equals that of the point it is tied to
             let fraction = |v: u32| {
@@ -142,17 +158,17 @@ mod tests {
 
     #[test]
     fn the_tip_of_a_dart_is_not_tied_to_itself() {
-        // a runs mouth to tip 5, b from the tip back to the mouth
-        let links = link(&[3, 4, 5], &[5, 6, 7], false, 0.1);
+        // a runs from the mouth to the tip 5, b has been turned to do so too
+        let links = tied(&[3, 4, 5], &[7, 6, 5], 0.1);
         assert_eq!(links.len(), 2);
         assert!(links.iter().all(|l| !l.edge.contains(&l.vertex)));
         assert!((sum(&links) - 0.1).abs() < 1e-15);
         // one piece: only the mouth is tied, with all the length
-        let links = link(&[3, 5], &[5, 7], false, 0.1);
+        let links = tied(&[3, 5], &[7, 5], 0.1);
         assert_eq!(links.len(), 1);
         assert!((links[0].length - 0.1).abs() < 1e-15);
         // a lens sewn to itself shares both ends
-        let links = link(&[3, 4, 5], &[5, 6, 3], false, 0.1);
+        let links = tied(&[3, 4, 5], &[3, 6, 5], 0.1);
         assert_eq!(links.len(), 1);
         assert!((sum(&links) - 0.1).abs() < 1e-15);
     }

@@ -45,9 +45,9 @@ impl Transfer {
                 if coarse_edge.len() < 2 || fine_edge.len() < 2 {
                     continue;
                 }
-                let (m, n) = (coarse_edge.len() - 1, fine_edge.len() - 1);
-                for (k, vertex) in fine_edge.iter().enumerate() {
-                    let piece = (k * m / n).min(m - 1);
+                let (from, to) = (fractions(coarse, coarse_edge), fractions(fine, fine_edge));
+                for (vertex, x) in fine_edge.iter().zip(&to) {
+                    let piece = from.partition_point(|y| y <= x).clamp(1, from.len() - 1) - 1;
                     let ends = [coarse_edge[piece], coarse_edge[piece + 1]];
                     if let Some(t) = sides.find(ends) {
                         triangle[*vertex as usize] = t;
@@ -85,6 +85,17 @@ impl Transfer {
 
 fn corners(mesh: &GarmentMesh, triangle: u32) -> [Vec2; 3] {
     mesh.triangles[triangle as usize].map(|v| mesh.uv[v as usize])
+}
+
+/// Fractions of the length of a chain of vertices.
+fn fractions(mesh: &GarmentMesh, chain: &[u32]) -> Vec<f64> {
+    let mut list = vec![0.0];
+    let mut sum = 0.0;
+    for w in chain.windows(2) {
+        sum += (mesh.uv[w[1] as usize] - mesh.uv[w[0] as usize]).norm();
+        list.push(sum);
+    }
+    list.iter().map(|x| x / sum).collect()
 }
 
 /// Triangles by their edges.

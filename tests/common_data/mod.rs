@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 /// The folder that `TOILE_DATA` names; without it the test skips, but under `CI=true` it fails.
-pub fn data_dir() -> Option<PathBuf> {
+pub(crate) fn data_dir() -> Option<PathBuf> {
     match std::env::var_os("TOILE_DATA") {
         Some(folder) => Some(PathBuf::from(folder)),
         None if std::env::var("CI").as_deref() == Ok("true") => {
