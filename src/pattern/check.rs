@@ -1,1 +1,371 @@
-//! Refuses garments that cannot be, naming panel, edge or seam.
+//! Refuses garments that cannot be, naming panel, edge or seam, the limit and the value.
+//!
+//! Limits: coordinates within 1e4 m, edges longer than 1e-5 m, areas above 1e-8 m^2, outlines that
+//! stay 1e-8 m clear of themselves (curves sampled every 1/16 of a half turn).
+
+use super::curve::Curve;
+use super::outline::{Piece, first_contact, inside, polylines};
+use super::{Garment, Panel};
+use crate::error::{Error, Result};
+use crate::math::Vec2;
+use std::collections::BTreeMap;
+
+/// Largest size of a coordinate [m].
+pub const MAX_COORDINATE: f64 = 1e4;
+/// Largest radius of an arc [m].
+pub const MAX_RADIUS: f64 = 1e6;
+/// Shortest edge [m].
+pub const MIN_EDGE: f64 = 1e-5;
+/// Smallest panel or hole [m^2].
+pub const MIN_AREA: f64 = 1e-8;
+/// Most edges of one panel.
+pub const MAX_EDGES: usize = 20_000;
+/// Vertex limit for hosts that name none.
+pub const DEFAULT_MAX_VERTICES: usize = 2_000_000;
+/// Angle between sampled points of a curve [rad].
+const TURN: f64 = std::f64::consts::PI / 16.0;
+
+impl Garment {
+    /// Checks everything but the size of the triangulation, then that its estimated vertex count is
+    /// at most `max_vertices`.
+    pub fn check(&self, max_vertices: usize) -> Result<()> {
+        self.check_geometry()?;
+        let estimate = self.estimated_vertices(1.0)?;
+        if estimate > max_vertices as f64 {
+            return Err(Error::limit(format!(
+                "garment '{}': edge length {} m asks for about {estimate:.3e} vertices, limit {max_vertices}",
+                self.name, self.edge_length
+            )));
+        }
+        Ok(())
+    }
+
+    /// Checks that panels, seams, fabrics and blend regions are possible and consistent.
+    pub fn check_geometry(&self) -> Result<()> {
+        if self.panels.is_empty() {
+            return Err(Error::geometry(format!(
+                "garment '{}' has no panels",
+                self.name
+            )));
+        }
+        if self.fabrics.is_empty() {
+            return Err(Error::material(format!(
+                "garment '{}' has no fabrics",
+                self.name
+            )));
+        }
+        let mut names = BTreeMap::new();
+        for (k, fabric) in self.fabrics.iter().enumerate() {
+            fabric.check()?;
+            if let Some(first) = names.insert(fabric.name.as_str(), k) {
+                return Err(Error::material(format!(
+                    "fabrics {first} and {k} are both named '{}'",
+                    fabric.name
+                )));
+            }
+        }
+        check_edge_length(&format!("garment '{}'", self.name), self.edge_length)?;
+        let mut names = BTreeMap::new();
+        for (k, panel) in self.panels.iter().enumerate() {
+            if let Some(first) = names.insert(panel.name.as_str(), k) {
+                return Err(Error::geometry(format!(
+                    "panels {first} and {k} are both named '{}'",
+                    panel.name
+                )));
+            }
+        }
+        self.check_seams()?;
+        for (k, panel) in self.panels.iter().enumerate() {
+            let place = format!("panel '{}'", panel.name);
+            check_panel_numbers(panel, self.fabrics.len()).map_err(|e| e.at(&place))?;
+            let darts = self.darts_of(k);
+            check_panel_shape(panel, &darts).map_err(|e| e.at(&place))?;
+        }
+        self.check_blend_regions()
+    }
+
+    /// `seam of each edge` for seams between two edges of this panel.
+    fn darts_of(&self, panel: usize) -> BTreeMap<usize, usize> {
+        let mut darts = BTreeMap::new();
+        for (k, seam) in self.seams.iter().enumerate() {
+            if seam.a.panel as usize == panel && seam.b.panel as usize == panel {
+                darts.insert(seam.a.edge as usize, k);
+                darts.insert(seam.b.edge as usize, k);
+            }
+        }
+        darts
+    }
+
+    fn check_seams(&self) -> Result<()> {
+        let mut used = BTreeMap::new();
+        for (k, seam) in self.seams.iter().enumerate() {
+            for (side, edge) in [("a", seam.a), ("b", seam.b)] {
+                let Some(panel) = self.panels.get(edge.panel as usize) else {
+                    return Err(Error::geometry(format!(
+                        "seam {k} side {side}: panel {} of {}",
+                        edge.panel,
+                        self.panels.len()
+                    )));
+                };
+                let count = panel.edge_count();
+                if edge.edge as usize >= count {
+                    return Err(Error::geometry(format!(
+                        "seam {k} side {side}: edge {} of panel '{}', which has {count}",
+                        edge.edge, panel.name
+                    )));
+                }
+                if side == "b" && seam.a == seam.b {
+                    return Err(Error::geometry(format!(
+                        "seam {k} joins edge {} of panel '{}' to itself",
+                        edge.edge, panel.name
+                    )));
+                }
+                if let Some(first) = used.insert((edge.panel, edge.edge), k) {
+                    return Err(Error::geometry(format!(
+                        "edge {} of panel '{}' is used by seams {first} and {k}",
+                        edge.edge, panel.name
+                    )));
+                }
+            }
+            if !seam.rest_angle.is_finite() || seam.rest_angle.abs() > std::f64::consts::PI {
+                return Err(Error::geometry(format!(
+                    "seam {k}: rest angle {} rad must lie within a half turn",
+                    seam.rest_angle
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_blend_regions(&self) -> Result<()> {
+        for (k, region) in self.blend_regions.iter().enumerate() {
+            if region.panel as usize >= self.panels.len() {
+                return Err(Error::geometry(format!(
+                    "blend region {k}: panel {} of {}",
+                    region.panel,
+                    self.panels.len()
+                )));
+            }
+            if region.polygon.len() < 3 {
+                return Err(Error::geometry(format!(
+                    "blend region {k}: {} corners, at least 3 needed",
+                    region.polygon.len()
+                )));
+            }
+            for (corner, p) in region.polygon.iter().enumerate() {
+                check_point(p).map_err(|e| e.at(format!("blend region {k} corner {corner}")))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn check_edge_length(place: &str, h: f64) -> Result<()> {
+    if !h.is_finite() || h <= 0.0 {
+        return Err(Error::geometry(format!(
+            "{place}: edge length {h} m must be finite and positive"
+        )));
+    }
+    Ok(())
+}
+
+fn check_point(p: &Vec2) -> Result<()> {
+    for x in p.iter() {
+        if !x.is_finite() || x.abs() > MAX_COORDINATE {
+            return Err(Error::geometry(format!(
+                "coordinate {x} m must be finite and within {MAX_COORDINATE} m"
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// Numbers, indices and closed loops of one panel.
+fn check_panel_numbers(panel: &Panel, fabrics: usize) -> Result<()> {
+    if panel.fabric >= fabrics {
+        return Err(Error::geometry(format!(
+            "fabric {} of {fabrics}",
+            panel.fabric
+        )));
+    }
+    if let Some(h) = panel.edge_length {
+        check_edge_length("own", h)?;
+    }
+    if !panel.grain.is_finite() {
+        return Err(Error::geometry(format!(
+            "grain {} rad is not finite",
+            panel.grain
+        )));
+    }
+    for (k, x) in panel.placement.translation.iter().enumerate() {
+        if !x.is_finite() || x.abs() > MAX_COORDINATE {
+            return Err(Error::geometry(format!(
+                "translation[{k}] = {x} m must be finite and within {MAX_COORDINATE} m"
+            )));
+        }
+    }
+    let norm = panel.placement.rotation.quaternion().norm();
+    if !((norm - 1.0).abs() < 1e-6) {
+        return Err(Error::geometry(format!(
+            "rotation quaternion of length {norm} must be of length 1"
+        )));
+    }
+    for (k, p) in panel.vertices.iter().enumerate() {
+        check_point(p).map_err(|e| e.at(format!("vertex {k}")))?;
+    }
+    let count = panel.edge_count();
+    if count > MAX_EDGES {
+        return Err(Error::limit(format!("{count} edges, limit {MAX_EDGES}")));
+    }
+    let corners = panel.vertices.len();
+    let edges: Vec<_> = panel.edges().collect();
+    for (ring, range) in panel.loops().into_iter().enumerate() {
+        let place = ring_name(ring);
+        if range.is_empty() {
+            return Err(Error::geometry(format!("{place} has no edges")));
+        }
+        for k in range.clone() {
+            let edge = edges[k];
+            for corner in [edge.start, edge.end] {
+                if corner as usize >= corners {
+                    return Err(Error::geometry(format!(
+                        "edge {k}: corner {corner} of {corners}"
+                    )));
+                }
+            }
+            let next = if k + 1 == range.end {
+                range.start
+            } else {
+                k + 1
+            };
+            if edge.end != edges[next].start {
+                return Err(Error::geometry(format!(
+                    "{place} is open: edge {k} ends in corner {}, edge {next} starts in corner {}",
+                    edge.end, edges[next].start
+                )));
+            }
+        }
+    }
+    for (k, segment) in panel.segments()?.iter().enumerate() {
+        check_curve(segment).map_err(|e| e.at(format!("edge {k}")))?;
+    }
+    Ok(())
+}
+
+fn check_curve(segment: &super::curve::Segment) -> Result<()> {
+    let chord = (segment.end - segment.start).norm();
+    match segment.curve {
+        Curve::Line => {}
+        Curve::Quadratic(c) => check_point(&c)?,
+        Curve::Cubic(c, d) => {
+            check_point(&c)?;
+            check_point(&d)?;
+        }
+        Curve::Arc { radius, .. } => {
+            if !radius.is_finite() || radius <= 0.0 || radius > MAX_RADIUS {
+                return Err(Error::geometry(format!(
+                    "arc radius {radius} m must be positive and at most {MAX_RADIUS} m"
+                )));
+            }
+            // files print semicircles with rounded radii
+            if radius < 0.5 * chord * (1.0 - 1e-6) {
+                return Err(Error::geometry(format!(
+                    "arc radius {radius} m is smaller than half the chord, {} m",
+                    0.5 * chord
+                )));
+            }
+            if chord < MIN_EDGE {
+                return Err(Error::geometry(format!(
+                    "arc between ends {chord} m apart, at least {MIN_EDGE} m needed: draw a full circle as two arcs"
+                )));
+            }
+        }
+    }
+    let length = segment.length();
+    if !(length >= MIN_EDGE) {
+        return Err(Error::geometry(format!(
+            "length {length} m, at least {MIN_EDGE} m needed"
+        )));
+    }
+    Ok(())
+}
+
+fn ring_name(ring: usize) -> String {
+    match ring {
+        0 => "outline".into(),
+        ring => format!("hole {}", ring - 1),
+    }
+}
+
+/// Areas, crossings and nesting of one panel whose numbers are good.
+fn check_panel_shape(panel: &Panel, darts: &BTreeMap<usize, usize>) -> Result<()> {
+    let segments = panel.segments()?;
+    let loops = panel.loops();
+    for (ring, range) in loops.iter().enumerate() {
+        let area: f64 = segments[range.clone()].iter().map(|s| s.area_term()).sum();
+        if !(area.abs() >= MIN_AREA) {
+            return Err(Error::geometry(format!(
+                "{} has area {:e} m^2, at least {MIN_AREA:e} m^2 needed",
+                ring_name(ring),
+                area.abs()
+            )));
+        }
+    }
+    let pieces = polylines(&segments, &loops, TURN);
+    if let Some((p, q)) = first_contact(&pieces)? {
+        return Err(Error::geometry(contact_text(&p, &q, darts)));
+    }
+    // nothing crosses: one point of a hole tells where all of it lies
+    for ring in 1..loops.len() {
+        let point = segments[loops[ring].start].start;
+        if !inside(point, &pieces, 0) {
+            return Err(Error::geometry(format!(
+                "{} lies outside the outline, at ({}, {}) m",
+                ring_name(ring),
+                point.x,
+                point.y
+            )));
+        }
+        if let Some(other) = (1..loops.len()).find(|o| *o != ring && inside(point, &pieces, *o)) {
+            return Err(Error::geometry(format!(
+                "{} lies inside {}",
+                ring_name(ring),
+                ring_name(other)
+            )));
+        }
+    }
+    Ok(())
+}
+
+fn contact_text(p: &Piece, q: &Piece, darts: &BTreeMap<usize, usize>) -> String {
+    let near = 0.25 * (p.a + p.b + q.a + q.b);
+    let place = format!("near ({:.6}, {:.6}) m", near.x, near.y);
+    match (darts.get(&p.edge), darts.get(&q.edge)) {
+        (Some(s), Some(t)) if s != t => {
+            format!(
+                "darts of seams {s} and {t} overlap: edges {} and {} cross or touch {place}",
+                p.edge, q.edge
+            )
+        }
+        _ if p.ring != q.ring => format!(
+            "{} and {} cross or touch: edges {} and {} {place}",
+            ring_name(p.ring),
+            ring_name(q.ring),
+            p.edge,
+            q.edge
+        ),
+        _ if p.edge == q.edge => {
+            format!(
+                "{} edge {} crosses or touches itself {place}",
+                ring_name(p.ring),
+                p.edge
+            )
+        }
+        _ => format!(
+            "{} edges {} and {} cross or touch {place}",
+            ring_name(p.ring),
+            p.edge,
+            q.edge
+        ),
+    }
+}

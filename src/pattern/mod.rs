@@ -10,6 +10,8 @@ pub mod curve;
 pub mod export;
 pub mod fabric;
 pub mod import;
+pub mod measure;
+pub mod outline;
 
 pub use fabric::{BendingModel, Fabric};
 

@@ -1,6 +1,15 @@
 //! Flat panels to triangles: constrained Delaunay refinement, seams matched by fraction of arc
 //! length, placement around the body, coarse levels of the same garment.
 
+pub mod boundary;
+pub mod delaunay;
+pub mod grid;
+pub mod quality;
+pub mod seam;
+pub mod transfer;
+
+pub use delaunay::triangulate;
+
 use crate::math::{Vec2, Vec3};
 
 /// Triangle mesh of a whole garment; vertices of different panels are never shared.
@@ -16,7 +25,9 @@ pub struct GarmentMesh {
     pub triangles: Vec<[u32; 3]>,
     /// Panel of each triangle.
     pub triangle_panel: Vec<u32>,
-    /// `edge_vertices[panel][edge]`: vertices along that edge from its start to its end.
+    /// `edge_vertices[panel][edge]`: vertices along that edge from its start to its end. The two
+    /// edges of a seam are cut at the same fractions of arc length: equal steps, graded where a
+    /// shorter or finer edge is near.
     pub edge_vertices: Vec<Vec<Vec<u32>>>,
     /// One entry for each seam of the garment.
     pub seams: Vec<SeamMesh>,
@@ -29,7 +40,8 @@ pub struct GarmentMesh {
 /// A seam on the mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SeamMesh {
-    /// Vertices tied to points of edges of the other side.
+    /// Vertices tied to points of edges of the other side. Usually every vertex of side a is tied to
+    /// one vertex of side b (`t` is 0 or 1); `length` sums to the mean length of the two edges.
     pub links: Vec<SeamLink>,
     /// Rest angle across the seam [rad].
     pub rest_angle: f64,

@@ -1,1 +1,0 @@
-//! Flat patterns to files: toile's own JSON, SVG.

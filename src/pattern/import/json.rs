@@ -1,0 +1,312 @@
+//! toile's own garment object, version 1. Keys and units stand in [`super::schema`].
+
+use super::DEFAULT_EDGE_LENGTH;
+use super::fabric::{fabric_from_json, fabric_from_node};
+use super::read::{Node, Object};
+use super::schema;
+use crate::error::{Error, Result};
+use crate::math::Rotation;
+use crate::pattern::curve::Curve;
+use crate::pattern::{BlendRegion, Edge, EdgeRef, Fabric, Garment, Panel, Placement, Seam};
+use nalgebra::Quaternion;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Version of the format that this library writes and reads.
+pub const VERSION: u32 = 1;
+
+/// Names to indices; a name that stands twice is ambiguous and cannot be used.
+struct Names<'a> {
+    what: &'static str,
+    index: BTreeMap<&'a str, Option<u32>>,
+    count: usize,
+}
+
+impl<'a> Names<'a> {
+    fn new(what: &'static str, names: impl Iterator<Item = &'a str>) -> Self {
+        let mut index = BTreeMap::new();
+        let mut count = 0;
+        for name in names {
+            index
+                .entry(name)
+                .and_modify(|entry| *entry = None)
+                .or_insert(Some(count as u32));
+            count += 1;
+        }
+        Self { what, index, count }
+    }
+
+    /// An index, or the name of exactly one thing.
+    fn find(&self, node: &Node<'_>) -> Result<u32> {
+        if let Some(name) = node.value.as_str() {
+            return match self.index.get(name) {
+                Some(Some(index)) => Ok(*index),
+                Some(None) => Err(node.error(format!("several {}s are named {name:?}", self.what))),
+                None => Err(node.error(format!("no {} is named {name:?}", self.what))),
+            };
+        }
+        let index = node.index()?;
+        if index as usize >= self.count {
+            return Err(node.error(format!("{} {index} of {}", self.what, self.count)));
+        }
+        Ok(index)
+    }
+}
+
+/// Reads a garment object; the notes tell what measured fabrics held that was not used.
+pub fn read_garment(
+    garment: &Object<'_>,
+    base_dir: Option<&Path>,
+) -> Result<(Garment, Vec<String>)> {
+    let version = garment.need("toile_garment")?;
+    if version.index()? != VERSION {
+        return Err(version.error(format!(
+            "version {} is not known, only {VERSION}",
+            version.index()?
+        )));
+    }
+    garment.only(schema::GARMENT)?;
+    let mut notes = Vec::new();
+    let mut fabrics = Vec::new();
+    if let Some(list) = garment.get("fabrics") {
+        for node in list.array()? {
+            let (fabric, more) = read_fabric(&node, base_dir)?;
+            notes.extend(more.iter().map(|note| format!("{}: {note}", node.path)));
+            fabrics.push(fabric);
+        }
+    }
+    if fabrics.is_empty() {
+        fabrics.push(Fabric::default());
+    }
+    let fabric_names = Names::new("fabric", fabrics.iter().map(|f| f.name.as_str()));
+    let mut panels = Vec::new();
+    for node in garment.need("panels")?.array()? {
+        panels.push(read_panel(&node.object()?, &fabric_names)?);
+    }
+    let panel_names = Names::new("panel", panels.iter().map(|p| p.name.as_str()));
+    let mut seams = Vec::new();
+    if let Some(list) = garment.get("seams") {
+        for node in list.array()? {
+            seams.push(read_seam(&node.object()?, &panel_names)?);
+        }
+    }
+    let mut blend_regions = Vec::new();
+    if let Some(list) = garment.get("blend_regions") {
+        for node in list.array()? {
+            blend_regions.push(read_blend_region(&node.object()?, &panel_names)?);
+        }
+    }
+    let garment = Garment {
+        name: match garment.get("name") {
+            Some(name) => name.text()?.to_owned(),
+            None => "garment".into(),
+        },
+        edge_length: garment.number_or("edge_length", DEFAULT_EDGE_LENGTH)?,
+        panels,
+        seams,
+        fabrics,
+        blend_regions,
+    };
+    Ok((garment, notes))
+}
+
+fn read_fabric(node: &Node<'_>, base_dir: Option<&Path>) -> Result<(Fabric, Vec<String>)> {
+    let Some(file) = node.value.as_str() else {
+        return fabric_from_node(node);
+    };
+    let Some(base_dir) = base_dir else {
+        return Err(node.error(format!(
+            "fabric file {file:?} cannot be found: the garment was read without a folder"
+        )));
+    };
+    let path = base_dir.join(file);
+    let text = std::fs::read_to_string(&path)
+        .map_err(|e| Error::io(format!("cannot read {}: {e}", path.display())).at(&node.path))?;
+    let (mut fabric, notes) =
+        fabric_from_json(&text).map_err(|e| e.at(path.display()).at(&node.path))?;
+    // measured files carry no name
+    if fabric.name == "measured fabric" {
+        if let Some(stem) = path.file_stem() {
+            fabric.name = stem.to_string_lossy().into_owned();
+        }
+    }
+    Ok((fabric, notes))
+}
+
+fn read_panel(panel: &Object<'_>, fabrics: &Names<'_>) -> Result<Panel> {
+    panel.only(schema::PANEL)?;
+    let mut vertices = Vec::new();
+    for node in panel.need("vertices")?.array()? {
+        vertices.push(node.vec2()?);
+    }
+    let corners = vertices.len();
+    let read_loop = |node: &Node<'_>| -> Result<Vec<Edge>> {
+        node.array()?
+            .iter()
+            .map(|edge| read_edge(edge, corners))
+            .collect()
+    };
+    let outline = read_loop(&panel.need("edges")?)?;
+    let mut holes = Vec::new();
+    if let Some(list) = panel.get("holes") {
+        for node in list.array()? {
+            holes.push(read_loop(&node)?);
+        }
+    }
+    Ok(Panel {
+        name: panel.need("name")?.text()?.to_owned(),
+        vertices,
+        outline,
+        holes,
+        placement: match panel.get("placement") {
+            Some(node) => read_placement(&node.object()?)?,
+            None => Placement::default(),
+        },
+        fabric: match panel.get("fabric") {
+            Some(node) => fabrics.find(&node)? as usize,
+            None => 0,
+        },
+        grain: read_angle(panel, "grain_deg", "grain_rad")?,
+        edge_length: panel
+            .get("edge_length")
+            .map(|node| node.number())
+            .transpose()?,
+        label: read_label(panel)?,
+    })
+}
+
+fn read_label(object: &Object<'_>) -> Result<Option<String>> {
+    object
+        .get("label")
+        .map(|node| node.text().map(str::to_owned))
+        .transpose()
+}
+
+/// An angle in degrees or in radians [rad].
+fn read_angle(object: &Object<'_>, degrees: &str, radians: &str) -> Result<f64> {
+    match (object.get(degrees), object.get(radians)) {
+        (Some(_), Some(_)) => {
+            Err(object.error(format!("has both '{degrees}' and '{radians}'; give one")))
+        }
+        (Some(node), None) => Ok(node.number()?.to_radians()),
+        (None, Some(node)) => node.number(),
+        (None, None) => Ok(0.0),
+    }
+}
+
+fn read_edge(node: &Node<'_>, corners: usize) -> Result<Edge> {
+    let ends = |node: &Node<'_>| -> Result<[u32; 2]> {
+        let pair = node.array_of::<2>()?;
+        let mut ends = [0; 2];
+        for (end, entry) in ends.iter_mut().zip(&pair) {
+            *end = entry.index()?;
+            if *end as usize >= corners {
+                return Err(entry.error(format!("corner {end} of {corners}")));
+            }
+        }
+        Ok(ends)
+    };
+    if node.value.is_array() {
+        let [start, end] = ends(node)?;
+        return Ok(Edge {
+            start,
+            end,
+            curve: Curve::Line,
+            label: None,
+        });
+    }
+    let edge = node.object()?;
+    edge.only(schema::EDGE)?;
+    let [start, end] = ends(&edge.need("endpoints")?)?;
+    let curve = match (edge.get("quadratic"), edge.get("cubic"), edge.get("arc")) {
+        (None, None, None) => Curve::Line,
+        (Some(c), None, None) => Curve::Quadratic(c.vec2()?),
+        (None, Some(c), None) => {
+            let [a, b] = c.array_of::<2>()?;
+            Curve::Cubic(a.vec2()?, b.vec2()?)
+        }
+        (None, None, Some(a)) => {
+            let arc = a.object()?;
+            arc.only(schema::ARC)?;
+            Curve::Arc {
+                radius: arc.need("radius")?.number()?,
+                large: arc.boolean_or("large", false)?,
+                right: arc.boolean_or("right", false)?,
+            }
+        }
+        _ => return Err(edge.error("has more than one of 'quadratic', 'cubic', 'arc'")),
+    };
+    Ok(Edge {
+        start,
+        end,
+        curve,
+        label: read_label(&edge)?,
+    })
+}
+
+fn read_placement(placement: &Object<'_>) -> Result<Placement> {
+    placement.only(schema::PLACEMENT)?;
+    let mut result = Placement::default();
+    if let Some(node) = placement.get("translation") {
+        result.translation = node.vec3()?;
+    }
+    match (
+        placement.get("rotation_deg"),
+        placement.get("quaternion_xyzw"),
+    ) {
+        (Some(_), Some(_)) => {
+            return Err(placement.error("has both 'rotation_deg' and 'quaternion_xyzw'; give one"));
+        }
+        (Some(node), None) => {
+            let angles = node.vec3()?.map(f64::to_radians);
+            result.rotation = Rotation::from_euler_angles(angles.x, angles.y, angles.z);
+        }
+        (None, Some(node)) => {
+            let [x, y, z, w] = node.array_of::<4>()?;
+            let q = Quaternion::new(w.number()?, x.number()?, y.number()?, z.number()?);
+            let norm = q.norm();
+            if !(norm > 1e-6 && norm < 1e6) {
+                return Err(node.error(format!("quaternion of length {norm} is no rotation")));
+            }
+            // what is unit up to rounding keeps its bits, so that files come back the same
+            result.rotation = if (norm - 1.0).abs() <= 1e-14 {
+                Rotation::new_unchecked(q)
+            } else {
+                Rotation::new_normalize(q)
+            };
+        }
+        (None, None) => {}
+    }
+    Ok(result)
+}
+
+fn read_seam(seam: &Object<'_>, panels: &Names<'_>) -> Result<Seam> {
+    seam.only(schema::SEAM)?;
+    let side = |key: &str| -> Result<EdgeRef> {
+        let [panel, edge] = seam.need(key)?.array_of::<2>()?;
+        Ok(EdgeRef {
+            panel: panels.find(&panel)?,
+            edge: edge.index()?,
+        })
+    };
+    Ok(Seam {
+        a: side("a")?,
+        b: side("b")?,
+        same_direction: seam.boolean_or("same_direction", false)?,
+        rest_angle: read_angle(seam, "rest_angle_deg", "rest_angle_rad")?,
+    })
+}
+
+fn read_blend_region(region: &Object<'_>, panels: &Names<'_>) -> Result<BlendRegion> {
+    region.only(schema::BLEND_REGION)?;
+    Ok(BlendRegion {
+        panel: panels.find(&region.need("panel")?)?,
+        polygon: region
+            .need("polygon")?
+            .array()?
+            .iter()
+            .map(Node::vec2)
+            .collect::<Result<_>>()?,
+        rings: region.get("rings").map_or(Ok(0), |node| node.index())?,
+    })
+}
