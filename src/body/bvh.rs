@@ -21,6 +21,8 @@ pub(super) struct Tri {
     /// Sphere around it.
     center: Vec3,
     radius: f64,
+    /// Unit normal; zero without area.
+    normal: Vec3,
     /// Number in the mesh.
     pub(super) id: u32,
 }
@@ -38,6 +40,10 @@ impl Tri {
             ac: c - a,
             center,
             radius: r2.sqrt(),
+            normal: (b - a)
+                .cross(&(c - a))
+                .try_normalize(f64::MIN_POSITIVE)
+                .unwrap_or_default(),
             id,
         }
     }
@@ -113,11 +119,10 @@ impl Tri {
         (p - self.a - self.ab * v - self.ac * w).norm_squared()
     }
 
-    /// Whether the sphere around it lies farther from `p` than `reach`.
+    /// Whether the disc around it lies farther from `p` than `reach`.
     #[inline]
-    pub(super) fn beyond(&self, p: &Vec3, reach: f64) -> bool {
-        let r = reach + self.radius;
-        (p - self.center).norm_squared() > r * r
+    fn beyond(&self, p: &Vec3, reach: f64) -> bool {
+        disc_beyond(&(p - self.center), &self.normal, self.radius, reach)
     }
 
     /// Whether the closed segment meets the closed triangle. Segments in its plane do not count.
@@ -133,6 +138,38 @@ impl Tri {
         let (u, v, w) = (volume(&self.a, &b), volume(&b, &c), volume(&c, &self.a));
         (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0)
     }
+}
+
+/// A triangle near a point, with what rejects it quickly.
+pub(super) struct Near<'a> {
+    /// Distance to the point.
+    pub(super) far: f64,
+    /// Disc around it.
+    center: Vec3,
+    radius: f64,
+    normal: Vec3,
+    pub(super) tri: &'a Tri,
+}
+
+impl Near<'_> {
+    /// Whether the disc around it lies farther from `p` than `reach`.
+    #[inline]
+    pub(super) fn beyond(&self, p: &Vec3, reach: f64) -> bool {
+        disc_beyond(&(p - self.center), &self.normal, self.radius, reach)
+    }
+}
+
+/// Whether a disc lies farther than `reach` from the point at `e` from its centre: with height `z`
+/// and `rho` off the axis its distance is `sqrt(z^2 + max(0, rho - radius)^2)`.
+#[inline]
+fn disc_beyond(e: &Vec3, normal: &Vec3, radius: f64, reach: f64) -> bool {
+    let z = normal.dot(e);
+    let room = reach * reach - z * z;
+    if room < 0.0 {
+        return true;
+    }
+    let rho = radius + room.sqrt();
+    e.norm_squared() - z * z > rho * rho
 }
 
 #[derive(Clone, Debug)]
@@ -260,19 +297,20 @@ impl Bvh {
         self.slack + 1e-12 * p.amax()
     }
 
-    /// Smallest distance to `p`. `bound` is any upper bound of it (infinity if none is known).
-    pub(super) fn distance(&self, p: &Vec3, bound: f64) -> f64 {
+    /// Smallest distance to `p`. `hint` is any place in the tree's list of triangles, best that of a
+    /// triangle near `p`; it becomes the place of the nearest one. The result does not depend on it.
+    pub(super) fn distance(&self, p: &Vec3, hint: &mut usize) -> f64 {
         let slack = self.slack(p);
-        let mut best = f64::INFINITY;
-        let mut reach = bound + slack;
-        self.visit(p, reach * reach, |t| {
-            if t.beyond(p, reach) {
-                return reach * reach;
-            }
-            let d2 = t.distance2(p);
-            if d2 < best {
-                best = d2;
-                reach = reach.min(d2.sqrt() + slack);
+        let mut best = self.tris[*hint].distance2(p);
+        let mut reach = best.sqrt() + slack;
+        self.visit(p, reach * reach, |i, t| {
+            if !t.beyond(p, reach) {
+                let d2 = t.distance2(p);
+                if d2 < best {
+                    best = d2;
+                    reach = d2.sqrt() + slack;
+                    *hint = i;
+                }
             }
             reach * reach
         });
@@ -283,7 +321,7 @@ impl Bvh {
     pub(super) fn nearest(&self, p: &Vec3) -> (u32, [f64; 3]) {
         let slack = self.slack(p);
         let mut best = (f64::INFINITY, u32::MAX, (0.0, 0.0));
-        self.visit(p, f64::INFINITY, |t| {
+        self.visit(p, f64::INFINITY, |_, t| {
             let (v, w) = t.closest(p);
             let d2 = (p - t.a - t.ab * v - t.ac * w).norm_squared();
             if d2 < best.0 || (d2 == best.0 && t.id < best.1) {
@@ -297,7 +335,7 @@ impl Bvh {
     }
 
     /// Calls `f` for triangles in boxes not farther than the squared reach, which `f` returns anew.
-    fn visit<'a>(&'a self, p: &Vec3, mut reach2: f64, mut f: impl FnMut(&'a Tri) -> f64) {
+    fn visit<'a>(&'a self, p: &Vec3, mut reach2: f64, mut f: impl FnMut(usize, &'a Tri) -> f64) {
         // the median split keeps the depth below 33 for any count that fits u32
         let mut stack = [(0u32, 0.0f64); 64];
         let mut top = 1;
@@ -311,8 +349,9 @@ impl Bvh {
             let node = &self.nodes[n as usize];
             if node.count > 0 {
                 let start = node.link as usize;
-                for t in &self.tris[start..start + node.count as usize] {
-                    reach2 = f(t);
+                let part = &self.tris[start..start + node.count as usize];
+                for (i, t) in part.iter().enumerate() {
+                    reach2 = f(start + i, t);
                 }
                 continue;
             }
@@ -329,31 +368,38 @@ impl Bvh {
         }
     }
 
-    /// Collects every triangle within `reach` of `p` (and some beyond) with its distance to `p`,
-    /// nearest first. Stops and returns false beyond `limit` triangles.
+    /// Collects every triangle within `reach` of `p` with its distance to `p`, nearest first. Stops and returns false beyond `limit` triangles.
     pub(super) fn within<'a>(
         &'a self,
         p: &Vec3,
         reach: f64,
         limit: usize,
-        out: &mut Vec<(f64, &'a Tri)>,
+        out: &mut Vec<Near<'a>>,
     ) -> bool {
         out.clear();
         let reach = reach + self.slack(p);
-        self.visit(p, reach * reach, |t| {
+        self.visit(p, reach * reach, |_, tri| {
             if out.len() > limit {
                 return -1.0;
             }
-            if !t.beyond(p, reach) {
-                out.push((t.distance2(p).sqrt(), t));
+            if !tri.beyond(p, reach) {
+                let far = tri.distance2(p).sqrt();
+                if far <= reach {
+                    out.push(Near {
+                        far,
+                        center: tri.center,
+                        radius: tri.radius,
+                        normal: tri.normal,
+                        tri,
+                    });
+                }
             }
             reach * reach
         });
         if out.len() > limit {
             return false;
         }
-        out.retain(|c| c.0 <= reach);
-        out.sort_unstable_by(|s, t| s.0.total_cmp(&t.0).then(s.1.id.cmp(&t.1.id)));
+        out.sort_unstable_by(|s, t| s.far.total_cmp(&t.far).then(s.tri.id.cmp(&t.tri.id)));
         true
     }
 

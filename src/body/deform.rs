@@ -130,7 +130,7 @@ impl MeshBody {
     }
 
     pub(super) fn exact_distance(&self, p: &Vec3) -> f64 {
-        let d = self.tree.distance(p, f64::INFINITY);
+        let d = self.tree.distance(p, &mut 0);
         if self.is_inside(p) { -d } else { d }
     }
 

@@ -16,7 +16,7 @@
 //! `spline::beyond_box`. Coefficients are f32: 6e-8 of the distance, far below the sampling error;
 //! the function built on them is C1 all the same.
 
-use super::bvh::Bvh;
+use super::bvh::{Bvh, Near};
 use super::sign::{self, Rows};
 use super::{Distance, spline};
 use crate::error::{Error, Result};
@@ -489,15 +489,13 @@ fn assemble(
             Rows::new(source.positions, source.triangles, bounds, s, axis)
         });
         workers.chunks(&mut drafts, 32, |_, part| {
-            let mut bound = f64::INFINITY;
-            let mut last = Vec3::zeros();
+            let mut hint = 0;
             let mut scratch = Vec::new();
             for draft in part {
                 let kept = old.as_ref().filter(|_| draft.kept != NONE);
                 if kept.is_none() {
                     let c = level.center(draft.brick);
-                    draft.center = source.tree.distance(&c, bound + (c - last).norm());
-                    (bound, last) = (draft.center, c);
+                    draft.center = source.tree.distance(&c, &mut hint);
                     draft.stored = draft.center <= band;
                 } else {
                     draft.stored = true;
@@ -513,9 +511,9 @@ fn assemble(
                     // a part of the mesh that swept over the brick turned its sign
                     draft.kept = NONE;
                     let c = level.center(draft.brick);
-                    draft.center = source.tree.distance(&c, f64::INFINITY);
+                    draft.center = source.tree.distance(&c, &mut hint);
                 }
-                sample(level, source.tree, draft, &mut scratch);
+                sample(level, source.tree, draft, hint, &mut scratch);
             }
         });
         drafts.retain(|d| d.stored);
@@ -542,47 +540,53 @@ fn inside(level: &Level, rows: &[Rows; 3], source: Source<'_>, brick: [i64; 3]) 
     bits
 }
 
-/// Signed distances of a brick's nodes, exact.
+/// Signed distances of a brick's nodes, exact. Neighbouring nodes follow each other, and each begins
+/// with the triangle that was nearest to the one before.
 fn sample<'a>(
     level: &Level,
     tree: &'a Bvh,
     draft: &mut Draft,
-    scratch: &mut Vec<(f64, &'a super::bvh::Tri)>,
+    hint: usize,
+    scratch: &mut Vec<Near<'a>>,
 ) {
     let center = level.center(draft.brick);
     let radius = RADIUS * level.h;
     // the nearest triangle of any node is within center distance + 2 radii of the centre
     let few = tree.within(&center, draft.center + 2.0 * radius, MANY, scratch);
-    let mut last = (draft.center, center);
-    draft.distances = Vec::with_capacity(64);
-    for n in 0..64 {
+    let mut hint = if few { 0 } else { hint };
+    draft.distances = vec![0.0; 64];
+    for step in 0..64 {
+        // boustrophedon: y and z run back and forth
+        let x = step >> 4;
+        let y = (step >> 2 & 3) ^ (3 * (x & 1));
+        let z = (step & 3) ^ (3 * (step >> 2 & 1));
+        let n = 16 * x + 4 * y + z;
         let (_, p) = level.node(draft.brick, n);
-        let bound = last.0 + (p - last.1).norm();
         let d = if few {
             let slack = tree.slack(&p);
             let off = (p - center).norm() + slack;
-            let mut reach = bound + slack;
-            let mut best = f64::INFINITY;
-            for (far, t) in scratch.iter() {
-                if far - off > reach {
+            let mut best = scratch[hint].tri.distance2(&p);
+            let mut reach = best.sqrt() + slack;
+            for (i, near) in scratch.iter().enumerate() {
+                if near.far - off > reach {
                     break;
                 }
-                if t.beyond(&p, reach) {
+                if near.beyond(&p, reach) {
                     continue;
                 }
-                let d2 = t.distance2(&p);
+                let d2 = near.tri.distance2(&p);
                 if d2 < best {
                     best = d2;
-                    reach = reach.min(d2.sqrt() + slack);
+                    reach = d2.sqrt() + slack;
+                    hint = i;
                 }
             }
             best.sqrt()
         } else {
-            tree.distance(&p, bound)
+            tree.distance(&p, &mut hint)
         };
-        last = (d, p);
         let signed = if draft.inside >> n & 1 == 1 { -d } else { d };
-        draft.distances.push(signed as f32);
+        draft.distances[n] = signed as f32;
     }
 }
 
