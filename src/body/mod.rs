@@ -1,16 +1,34 @@
 //! Bodies as signed distance, negative inside: analytic shapes, grids, triangle meshes; rigid
 //! poses; deforming meshes.
 //!
-//! A [`Shape`] is immutable and shared; a pose (and, for a deforming mesh, a changed field) belongs
-//! to the simulation's State.
+//! A shape is immutable and shared; a pose (and, for a deforming mesh, its vertices) belongs to the
+//! simulation's State. Analytic shapes are exact; sampled ones are read through a C1 spline (see
+//! `spline` for why it is not the trilinear interpolant, and for its error).
 
+mod analytic;
+mod bvh;
+mod deform;
+mod field;
+mod grid;
+pub mod mannequin;
+mod mesh;
+mod obj;
+mod sign;
+mod spline;
+mod surface_nets;
+
+pub use mesh::MeshReport;
+
+use crate::error::{Error, Result};
+use crate::math::parallel::Workers;
 use crate::math::{Mat3, Rotation, Vec3};
+use std::sync::Arc;
 
 /// Signed distance and its derivatives at a point of the body's own frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Distance {
-    /// Signed distance [m], negative inside. Beyond the stored band it is a bound with the right
-    /// sign whose magnitude is never larger than the true distance.
+    /// Signed distance [m], negative inside. Outside a sampled body's box it is a bound with the
+    /// right sign whose magnitude is never larger than the true distance.
     pub value: f64,
     /// Gradient of `value`; unit length up to interpolation error.
     pub gradient: Vec3,
@@ -66,102 +84,256 @@ impl Pose {
 /// A body's shape, cheap to clone and shared between simulations.
 #[derive(Clone, Debug)]
 pub struct Body {
-    shape: std::sync::Arc<Shape>,
+    shape: Arc<Shape>,
 }
 
 #[derive(Debug)]
 enum Shape {
     Sphere { radius: f64 },
+    Capsule { half_length: f64, radius: f64 },
+    Plane { normal: Vec3, offset: f64 },
+    Grid(grid::Grid),
+    Mesh(deform::MeshBody),
 }
 
-use crate::error::{Error, Result};
+impl From<Shape> for Body {
+    fn from(shape: Shape) -> Self {
+        Self {
+            shape: Arc::new(shape),
+        }
+    }
+}
 
 impl Body {
     /// Sphere around the origin.
     pub fn sphere(radius: f64) -> Result<Self> {
-        if !(radius.is_finite() && radius > 0.0) {
-            return Err(Error::argument(format!(
-                "sphere radius {radius} must be positive"
-            )));
-        }
-        Ok(Self {
-            shape: std::sync::Arc::new(Shape::Sphere { radius }),
-        })
+        let radius = analytic::positive("sphere radius", radius)?;
+        Ok(Shape::Sphere { radius }.into())
     }
 
     /// Capsule along y: the segment from `-half_length` to `half_length`, thickened by `radius`.
-    pub fn capsule(_half_length: f64, _radius: f64) -> Result<Self> {
-        Err(Error::unsupported("capsule"))
+    /// A half length of 0 is a sphere.
+    pub fn capsule(half_length: f64, radius: f64) -> Result<Self> {
+        let radius = analytic::positive("capsule radius", radius)?;
+        if !(half_length.is_finite() && half_length >= 0.0) {
+            return Err(Error::argument(format!(
+                "capsule half length is {half_length}; it must be finite and not negative"
+            )));
+        }
+        Ok(Shape::Capsule {
+            half_length,
+            radius,
+        }
+        .into())
     }
 
     /// Half space `normal . x <= offset` (inside); the normal need not be unit.
-    pub fn plane(_normal: [f64; 3], _offset: f64) -> Result<Self> {
-        Err(Error::unsupported("plane"))
+    pub fn plane(normal: [f64; 3], offset: f64) -> Result<Self> {
+        let (normal, offset) = analytic::checked_plane(normal, offset)?;
+        Ok(Shape::Plane { normal, offset }.into())
     }
 
     /// Signed distances [m] on the nodes of a regular grid: node `(i, j, k)` at
     /// `origin + cell_size * (i, j, k)`, stored with `k` fastest.
     pub fn grid(
-        _counts: [usize; 3],
-        _origin: [f64; 3],
-        _cell_size: f64,
-        _values: &[f64],
+        counts: [usize; 3],
+        origin: [f64; 3],
+        cell_size: f64,
+        values: &[f64],
     ) -> Result<Self> {
-        Err(Error::unsupported("grid"))
+        Ok(Shape::Grid(grid::Grid::new(counts, origin, cell_size, values)?).into())
     }
 
     /// Closed triangle mesh [m]; the field is sampled at `cell_size` [m] (0 chooses) near the
-    /// surface.
-    pub fn mesh(_positions: &[[f64; 3]], _triangles: &[[u32; 3]], _cell_size: f64) -> Result<Self> {
-        Err(Error::unsupported("mesh"))
+    /// surface and at 4 times that and so on farther away.
+    pub fn mesh(positions: &[[f64; 3]], triangles: &[[u32; 3]], cell_size: f64) -> Result<Self> {
+        Self::mesh_with(positions, triangles, cell_size, &Workers::new(1))
     }
 
-    /// Reads a Wavefront OBJ file; `scale` multiplies its coordinates.
-    pub fn obj(_path: &std::path::Path, _scale: f64, _cell_size: f64) -> Result<Self> {
-        Err(Error::unsupported("obj"))
+    /// [`Body::mesh`] on several threads; the same bits for any number of them.
+    pub fn mesh_with(
+        positions: &[[f64; 3]],
+        triangles: &[[u32; 3]],
+        cell_size: f64,
+        workers: &Workers,
+    ) -> Result<Self> {
+        let mesh = deform::MeshBody::new(positions, triangles, cell_size, workers)?;
+        Ok(Shape::Mesh(mesh).into())
+    }
+
+    /// Reads a Wavefront OBJ file; `scale` multiplies its coordinates. Vertices keep the file's
+    /// order and count.
+    pub fn obj(path: &std::path::Path, scale: f64, cell_size: f64) -> Result<Self> {
+        let (positions, triangles) = obj::read(path, scale)?;
+        Self::mesh(&positions, &triangles, cell_size).map_err(|e| e.at(path.display()))
+    }
+
+    /// [`Body::obj`] from bytes in memory.
+    pub fn obj_bytes(bytes: &[u8], scale: f64, cell_size: f64) -> Result<Self> {
+        let (positions, triangles) = obj::parse(bytes, scale)?;
+        Self::mesh(&positions, &triangles, cell_size)
     }
 
     /// Signed distance in the body's own frame.
     pub fn distance(&self, point: &Vec3) -> Distance {
-        let Shape::Sphere { radius } = *self.shape;
-        let r = point.norm().max(1e-300);
-        let n = point / r;
-        Distance {
-            value: r - radius,
-            gradient: n,
-            hessian: (Mat3::identity() - n * n.transpose()) / r,
+        match &*self.shape {
+            Shape::Sphere { radius } => analytic::sphere(*radius, point),
+            Shape::Capsule {
+                half_length,
+                radius,
+            } => analytic::capsule(*half_length, *radius, point),
+            Shape::Plane { normal, offset } => analytic::plane(normal, *offset, point),
+            Shape::Grid(grid) => grid.distance(point),
+            Shape::Mesh(mesh) => mesh.field.distance(point),
         }
     }
 
     /// Signed distance only.
     pub fn value(&self, point: &Vec3) -> f64 {
-        self.distance(point).value
+        match &*self.shape {
+            Shape::Mesh(mesh) => mesh.field.value(point),
+            _ => self.distance(point).value,
+        }
     }
 
-    /// Vertices of a mesh body as created, else empty.
+    /// Vertices of a mesh body at its present deformation, else empty.
     pub fn vertices(&self) -> &[Vec3] {
-        &[]
+        self.as_mesh().map_or(&[], deform::MeshBody::vertices)
     }
 
-    /// Triangles of a mesh body, else empty. Analytic bodies give a display mesh through
-    /// [`Body::display_mesh`].
+    /// Triangles of a mesh body (turned outward if they were not), else empty. Other bodies give a
+    /// display mesh through [`Body::display_mesh`].
     pub fn triangles(&self) -> &[[u32; 3]] {
-        &[]
+        self.as_mesh().map_or(&[], deform::MeshBody::triangles)
     }
 
-    /// Triangle mesh to draw the body: its own, or a tessellation (a plane gives a square).
+    /// Triangle mesh to draw the body: its own, or a tessellation (a plane gives a square of 4 m).
     pub fn display_mesh(&self) -> (Vec<Vec3>, Vec<[u32; 3]>) {
-        (Vec::new(), Vec::new())
+        match &*self.shape {
+            Shape::Sphere { radius } => analytic::capsule_mesh(0.0, *radius),
+            Shape::Capsule {
+                half_length,
+                radius,
+            } => analytic::capsule_mesh(*half_length, *radius),
+            Shape::Plane { normal, offset } => analytic::plane_mesh(normal, *offset),
+            Shape::Grid(grid) => {
+                let (lo, hi) = grid.bounds();
+                // a coarser lattice for a grid too fine to draw
+                let size = hi - lo;
+                let limit = (size.product() / 2e6).cbrt();
+                let cell = grid.cell_size().max(limit);
+                let border = Vec3::repeat(1.5 * cell);
+                surface_nets::surface_nets(
+                    &|p| grid.distance(p).value,
+                    &(lo - border),
+                    &(hi + border),
+                    cell,
+                )
+            }
+            Shape::Mesh(mesh) => (mesh.vertices().to_vec(), mesh.triangles().to_vec()),
+        }
     }
 
-    /// The same body with its mesh deformed: field recomputed near the triangles that moved.
-    /// The result's bits depend on `vertices` alone, not on `self`'s own deformation.
-    pub fn deformed(&self, _vertices: &[Vec3]) -> Result<Self> {
-        Err(Error::unsupported("only mesh bodies deform"))
+    /// The same body with its mesh deformed: field recomputed near the triangles that moved since
+    /// the body was created. The result's bits depend on `vertices` alone, not on `self`'s own
+    /// deformation.
+    pub fn deformed(&self, vertices: &[Vec3]) -> Result<Self> {
+        self.deformed_with(vertices, &Workers::new(1))
+    }
+
+    /// [`Body::deformed`] on several threads; the same bits for any number of them.
+    pub fn deformed_with(&self, vertices: &[Vec3], workers: &Workers) -> Result<Self> {
+        match self.as_mesh() {
+            Some(mesh) => Ok(Shape::Mesh(mesh.deformed(vertices, workers)?).into()),
+            None => Err(Error::unsupported("only mesh bodies deform")),
+        }
     }
 
     /// Nearest surface point of a mesh body: triangle and barycentric weights.
-    pub fn nearest(&self, _point: &Vec3) -> Option<(u32, [f64; 3])> {
-        None
+    pub fn nearest(&self, point: &Vec3) -> Option<(u32, [f64; 3])> {
+        self.as_mesh().map(|m| m.nearest(point))
+    }
+
+    /// Where a point of the body's frame goes when the mesh moves from its present vertices to
+    /// `to`: it takes the displacement of the nearest material point of the surface. `None` for
+    /// bodies without a mesh and for another number of vertices.
+    pub fn carried(&self, to: &[Vec3], point: &Vec3) -> Option<Vec3> {
+        self.as_mesh()?.carried(to, point)
+    }
+
+    /// Whether a point lies inside, without the field: a mesh is asked for its generalized winding
+    /// number (one solid angle per triangle, slow and exact).
+    pub fn is_inside(&self, point: &Vec3) -> bool {
+        match &*self.shape {
+            Shape::Mesh(mesh) => mesh.is_inside(point),
+            _ => self.distance(point).value < 0.0,
+        }
+    }
+
+    /// Signed distance without the field: exact to the triangles of a mesh, signed by
+    /// [`Body::is_inside`]; other bodies give [`Body::value`].
+    pub fn exact_distance(&self, point: &Vec3) -> f64 {
+        match &*self.shape {
+            Shape::Mesh(mesh) => mesh.exact_distance(point),
+            _ => self.distance(point).value,
+        }
+    }
+
+    /// Which of the segments meet the body's surface. A mesh is tested triangle by triangle. Other
+    /// bodies are walked along by their distance; a graze that stays shorter than a thousandth of
+    /// the segment may be missed there.
+    pub fn intersections(&self, segments: &[(Vec3, Vec3)]) -> Vec<usize> {
+        let hits = |s: &(Vec3, Vec3)| match &*self.shape {
+            Shape::Mesh(mesh) => mesh.segment_hits(&s.0, &s.1),
+            _ => self.changes_sign(&s.0, &s.1),
+        };
+        (0..segments.len())
+            .filter(|&i| hits(&segments[i]))
+            .collect()
+    }
+
+    fn changes_sign(&self, p: &Vec3, q: &Vec3) -> bool {
+        let length = (q - p).norm();
+        if !length.is_finite() {
+            return false;
+        }
+        let first = self.value(p);
+        let (mut t, mut d) = (0.0, first);
+        while t < length {
+            // the distance changes by at most the way gone
+            t = (t + d.abs().max(1e-3 * length)).min(length);
+            d = self.value(&p.lerp(q, t / length));
+            if (d < 0.0) != (first < 0.0) {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// What was found in a mesh body's mesh.
+    pub fn mesh_report(&self) -> Option<&MeshReport> {
+        self.as_mesh().map(deform::MeshBody::report)
+    }
+
+    /// Finest spacing of a sampled body's field [m].
+    pub fn cell_size(&self) -> Option<f64> {
+        match &*self.shape {
+            Shape::Grid(grid) => Some(grid.cell_size()),
+            Shape::Mesh(mesh) => Some(mesh.field.cell_size()),
+            _ => None,
+        }
+    }
+
+    /// Bricks (of 4 x 4 x 4 nodes) of a mesh body's field per level, finest first, and the bytes
+    /// they take.
+    pub fn field_size(&self) -> Option<(Vec<usize>, usize)> {
+        self.as_mesh().map(|m| (m.field.bricks(), m.field.bytes()))
+    }
+
+    fn as_mesh(&self) -> Option<&deform::MeshBody> {
+        match &*self.shape {
+            Shape::Mesh(mesh) => Some(mesh),
+            _ => None,
+        }
     }
 }
