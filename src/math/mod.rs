@@ -2,7 +2,10 @@
 //! block-sparse matrices, deterministic parallel loops, finite differences.
 
 pub mod block;
+pub mod diff;
+pub mod geometry;
 pub mod parallel;
+pub mod spd;
 
 /// Point or vector in space, in metres unless said otherwise.
 pub type Vec3 = nalgebra::Vector3<f64>;

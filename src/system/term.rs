@@ -8,8 +8,8 @@ use crate::body::Distance;
 use crate::math::{Mat3, Vec2, Vec3};
 use crate::pattern::Fabric;
 
-/// Largest number of vertices in a stencil.
-pub const MAX_ARITY: usize = 4;
+/// Largest number of vertices in a stencil (a bending fan: a vertex and its ring).
+pub const MAX_ARITY: usize = 16;
 /// Blocks of the lower triangle of the largest stencil.
 pub const MAX_BLOCKS: usize = MAX_ARITY * (MAX_ARITY + 1) / 2;
 

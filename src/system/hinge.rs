@@ -1,0 +1,233 @@
+//! Bending by dihedral angles with a rest angle, summed over the fan of each vertex.
+//!
+//! With the operator of [`bending_fan`](super::bending_fan) and the angles `theta_e` of the hinges
+//! at a vertex (discrete shells, Grinspun et al. 2003; angles by `atan2`, never `acos`)
+//!
+//! ```text
+//! r = sum_e c_e (theta_e - theta0_e),   V = 1/(2A) sum_k d_k r_k^2,   c_e = l_e/2 (n1^2, sqrt2 n1 n2, n2^2)
+//! ```
+//!
+//! `Psd` is the Gauss-Newton part `J^T diag(d/A) J`, `J = sum_e c_e dtheta_e/dx`; `Exact` adds
+//! `sum_e (c_e . diag(d/A) r) d^2 theta_e / dx^2`. Damping replaces `r` by the change of `r` since the
+//! start of the step, times `beta/dt`; rigid motion is not damped. SI units. Limits: an angle jumps
+//! by a full turn where two triangles fold through each other; below 1e-4 of its rest size a
+//! triangle counts as degenerate and the derivatives are bounded, no longer exact.
+
+use super::bending_fan::{FanGroup, FanRest, MAX_HINGES, fan_groups, measure_with_rate, rigidity};
+use super::term::{Configuration, HessianKind, MAX_ARITY, RestChange, Stencils, Term};
+use crate::cloth::Cloth;
+use crate::error::{Error, Result};
+use crate::math::geometry::{dihedral, dihedral_gradient, dihedral_hessian, hinges, wrap_angle};
+use crate::math::{Mat3, Vec2, Vec3};
+use crate::pattern::BendingModel;
+
+/// Bending of all vertices with the same number of neighbours.
+pub struct Hinge {
+    group: FanGroup,
+    /// Rest angles of the hinges of each fan [rad]; empty when flat.
+    rest_angles: Vec<[f64; MAX_HINGES]>,
+}
+
+fn gather(fan: &FanRest, k: usize, vertices: &[u32], x: &[Vec3]) -> ([usize; 4], [Vec3; 4]) {
+    let local = fan.local_hinge(k);
+    (local, local.map(|i| x[vertices[i] as usize]))
+}
+
+impl Hinge {
+    /// Bending of all panels with a fabric of [`BendingModel::Hinge`], flat at rest: one term for
+    /// each number of neighbours that occurs.
+    pub fn terms(cloth: &Cloth) -> Vec<Self> {
+        fan_groups(cloth, BendingModel::Hinge)
+            .into_iter()
+            .map(|group| Self {
+                group,
+                rest_angles: Vec::new(),
+            })
+            .collect()
+    }
+
+    /// Same with a rest angle for each hinge of [`hinges`] of the mesh's triangles [rad].
+    pub fn terms_with_rest_angles(cloth: &Cloth, angles: &[f64]) -> Result<Vec<Self>> {
+        let all = hinges(&cloth.mesh.triangles);
+        if all.len() != angles.len() {
+            return Err(Error::argument(format!(
+                "{} rest angles for {} hinges",
+                angles.len(),
+                all.len()
+            )));
+        }
+        if let Some(k) = angles.iter().position(|a| !a.is_finite()) {
+            return Err(Error::argument(format!(
+                "rest angle {} of hinge {k} is not finite",
+                angles[k]
+            )));
+        }
+        let mut terms = Self::terms(cloth);
+        for term in &mut terms {
+            let arity = term.group.arity;
+            for (e, fan) in term.group.fans.iter().enumerate() {
+                let vertices = &term.group.vertices[arity * e..][..arity];
+                let mut rest = [0.0; MAX_HINGES];
+                for (k, angle) in rest.iter_mut().enumerate().take(fan.hinge_count()) {
+                    let v = vertices[fan.local_hinge(k)[1]];
+                    let key = (vertices[0].min(v), vertices[0].max(v));
+                    if let Ok(h) = all.binary_search_by_key(&key, |h| (h[0], h[1])) {
+                        *angle = angles[h];
+                    }
+                }
+                term.rest_angles.push(rest);
+            }
+        }
+        Ok(terms)
+    }
+
+    fn rest_angle(&self, e: usize, k: usize) -> f64 {
+        self.rest_angles.get(e).map_or(0.0, |a| a[k])
+    }
+
+    fn vertices(&self, e: usize) -> &[u32] {
+        &self.group.vertices[self.group.arity * e..][..self.group.arity]
+    }
+
+    /// Bend `r` from the rest angles, and its change since the start of the step.
+    fn bend(&self, e: usize, at: &Configuration<'_>, weights: &[Vec3], rate: bool) -> (Vec3, Vec3) {
+        let (fan, vertices) = (&self.group.fans[e], self.vertices(e));
+        let (mut now, mut since) = (Vec3::zeros(), Vec3::zeros());
+        for (k, c) in weights.iter().enumerate() {
+            let angle = dihedral(&gather(fan, k, vertices, at.x).1);
+            now += c * (angle - self.rest_angle(e, k));
+            if rate {
+                let before = dihedral(&gather(fan, k, vertices, at.x0).1);
+                since += c * wrap_angle(angle - before);
+            }
+        }
+        (now, since)
+    }
+
+    /// The derivative of the energy by `r`.
+    fn moment(&self, e: usize, at: &Configuration<'_>) -> Vec3 {
+        let fan = &self.group.fans[e];
+        let rate = fan.damping * at.inv_dt;
+        let (now, since) = self.bend(e, at, &fan.measure.weights, rate > 0.0);
+        fan.rigidity.component_mul(&(now + since * rate)) / fan.measure.area
+    }
+
+    /// `out = sum_e factor_e dtheta_e/dx`.
+    fn spread(
+        &self,
+        e: usize,
+        at: &Configuration<'_>,
+        factor: impl Fn(usize) -> f64,
+        out: &mut [Vec3],
+    ) {
+        let (fan, vertices) = (&self.group.fans[e], self.vertices(e));
+        out.fill(Vec3::zeros());
+        for k in 0..fan.hinge_count() {
+            let (local, x) = gather(fan, k, vertices, at.x);
+            let f = factor(k);
+            for (i, g) in local.into_iter().zip(dihedral_gradient(&x, fan.floor)) {
+                out[i] += g * f;
+            }
+        }
+    }
+}
+
+impl Term for Hinge {
+    fn name(&self) -> &'static str {
+        "hinge"
+    }
+
+    fn stencils(&self) -> Stencils<'_> {
+        Stencils {
+            arity: self.group.arity,
+            vertices: &self.group.vertices,
+        }
+    }
+
+    fn value(&self, e: usize, at: &Configuration<'_>) -> f64 {
+        let fan = &self.group.fans[e];
+        let rate = fan.damping * at.inv_dt;
+        let (now, since) = self.bend(e, at, &fan.measure.weights, rate > 0.0);
+        let quadratic = |r: &Vec3| fan.rigidity.dot(&r.component_mul(r));
+        (quadratic(&now) + rate * quadratic(&since)) / (2.0 * fan.measure.area)
+    }
+
+    fn gradient(&self, e: usize, at: &Configuration<'_>, out: &mut [Vec3]) {
+        let moment = self.moment(e, at);
+        let weights = &self.group.fans[e].measure.weights;
+        self.spread(e, at, |k| weights[k].dot(&moment), out);
+    }
+
+    fn hessian(&self, e: usize, at: &Configuration<'_>, kind: HessianKind, out: &mut [Mat3]) {
+        let (fan, vertices) = (&self.group.fans[e], self.vertices(e));
+        let arity = self.group.arity;
+        let weights = &fan.measure.weights;
+        // rows: components of r
+        let mut b = [Mat3::zeros(); MAX_ARITY];
+        for k in 0..fan.hinge_count() {
+            let (local, x) = gather(fan, k, vertices, at.x);
+            for (i, g) in local.into_iter().zip(dihedral_gradient(&x, fan.floor)) {
+                b[i] += weights[k] * g.transpose();
+            }
+        }
+        let scale = (1.0 + fan.damping * at.inv_dt) / fan.measure.area;
+        let d = Mat3::from_diagonal(&(fan.rigidity * scale));
+        for i in 0..arity {
+            let left = b[i].transpose() * d;
+            for j in 0..=i {
+                out[i * (i + 1) / 2 + j] = left * b[j];
+            }
+        }
+        if kind == HessianKind::Psd {
+            return;
+        }
+        let moment = self.moment(e, at);
+        for k in 0..fan.hinge_count() {
+            let (local, x) = gather(fan, k, vertices, at.x);
+            let f = weights[k].dot(&moment);
+            let h = dihedral_hessian(&x, fan.floor);
+            for (p, &i) in local.iter().enumerate() {
+                for (q, &j) in local.iter().enumerate() {
+                    if j <= i {
+                        out[i * (i + 1) / 2 + j] += h[p][q] * f;
+                    }
+                }
+            }
+        }
+    }
+
+    fn rest_gradient(
+        &self,
+        e: usize,
+        at: &Configuration<'_>,
+        change: &RestChange<'_>,
+        out: &mut [Vec3],
+    ) {
+        let (fan, vertices) = (&self.group.fans[e], self.vertices(e));
+        let fabric = &change.fabrics[fan.fabric];
+        let duv: Vec<Vec2> = vertices
+            .iter()
+            .map(|&v| fan.rotation * change.uv[v as usize])
+            .collect();
+        let (_, rates) = measure_with_rate(&fan.uv, &duv, fan.closed);
+        let (rate, drate) = (
+            fan.damping * at.inv_dt,
+            fabric.damping_stiffness * at.inv_dt,
+        );
+        let damped = rate > 0.0 || drate != 0.0;
+        let (now, since) = self.bend(e, at, &fan.measure.weights, damped);
+        let (dnow, dsince) = self.bend(e, at, &rates.weights, damped);
+        let (total, dtotal) = (now + since * rate, dnow + dsince * rate + since * drate);
+        let area = fan.measure.area;
+        let moment = fan.rigidity.component_mul(&total) / area;
+        let dmoment =
+            (rigidity(fabric).component_mul(&total) + fan.rigidity.component_mul(&dtotal)) / area
+                - moment * (rates.area / area);
+        self.spread(
+            e,
+            at,
+            |k| fan.measure.weights[k].dot(&dmoment) + rates.weights[k].dot(&moment),
+            out,
+        );
+    }
+}

@@ -1,0 +1,195 @@
+//! Quadratic (isometric) bending: a constant, positive semi-definite Hessian.
+//!
+//! The operator of [`bending_fan`](super::bending_fan) with the slope jumps of the flat mesh instead
+//! of angles, applied to the three coordinates of the surface (the idea of Bergou et al. 2006):
+//! `R = sum_j b_j x_j^T` (3 moment components x 3 coordinates), `b_j = sum_e c_e w_ej` with the weights
+//! `w` of [`jump`](crate::math::geometry::jump), and
+//!
+//! ```text
+//! V = 1/(2A) sum_k d_k |R_k|^2 = 1/2 sum_ij K_ij x_i . x_j,   K_ij = b_i . diag(d/A) b_j
+//! ```
+//!
+//! For isometric deformation `|R_k|/A` are the curvatures, so that a cylinder costs what the
+//! material says, orthotropic fabrics included. Flat rest shape only. Damping is `beta/(2 dt)` of the
+//! same form in `x - x0`: the Hessian stays constant, at the price of a small drag on the rotation of
+//! curved cloth (of the order of beta times the bending force). SI units.
+
+use super::bending_fan::{FanGroup, fan_groups, measure_with_rate, rigidity};
+use super::term::{Configuration, HessianKind, RestChange, Stencils, Term};
+use crate::cloth::Cloth;
+use crate::math::geometry::{jump, jump_rate};
+use crate::math::{Mat3, Vec2, Vec3};
+use crate::pattern::BendingModel;
+
+/// Quadratic bending of all vertices with the same number of neighbours.
+pub struct QuadraticBending {
+    group: FanGroup,
+    /// Lower triangle of `K` of each fan, row by row [N/m].
+    stiffness: Vec<f64>,
+}
+
+fn blocks(arity: usize) -> usize {
+    arity * (arity + 1) / 2
+}
+
+impl QuadraticBending {
+    /// Bending of all panels with a fabric of [`BendingModel::Quadratic`]: one term for each number
+    /// of neighbours that occurs.
+    pub fn terms(cloth: &Cloth) -> Vec<Self> {
+        fan_groups(cloth, BendingModel::Quadratic)
+            .into_iter()
+            .map(|group| {
+                let mut stiffness = Vec::with_capacity(blocks(group.arity) * group.fans.len());
+                for fan in &group.fans {
+                    let still = vec![Vec2::zeros(); fan.uv.len()];
+                    let (b, _) = operator(fan, &still);
+                    let d = fan.rigidity / fan.measure.area;
+                    for i in 0..b.len() {
+                        for j in 0..=i {
+                            stiffness.push(b[i].component_mul(&d).dot(&b[j]));
+                        }
+                    }
+                }
+                Self { group, stiffness }
+            })
+            .collect()
+    }
+
+    fn stiffness(&self, e: usize) -> &[f64] {
+        let n = blocks(self.group.arity);
+        &self.stiffness[n * e..][..n]
+    }
+
+    fn vertices(&self, e: usize) -> &[u32] {
+        &self.group.vertices[self.group.arity * e..][..self.group.arity]
+    }
+}
+
+/// Coefficients `b_j` of a fan and their rates when its flat vertices move.
+fn operator(fan: &super::bending_fan::FanRest, duv: &[Vec2]) -> (Vec<Vec3>, Vec<Vec3>) {
+    let (_, rates) = measure_with_rate(&fan.uv, duv, fan.closed);
+    let mut b = vec![Vec3::zeros(); fan.uv.len()];
+    let mut db = b.clone();
+    for k in 0..fan.hinge_count() {
+        let local = fan.local_hinge(k);
+        let (p, dp) = (local.map(|i| fan.uv[i]), local.map(|i| duv[i]));
+        let (w, dw) = (jump(&p), jump_rate(&p, &dp));
+        for (n, i) in local.into_iter().enumerate() {
+            b[i] += fan.measure.weights[k] * w[n];
+            db[i] += rates.weights[k] * w[n] + fan.measure.weights[k] * dw[n];
+        }
+    }
+    (b, db)
+}
+
+/// `1/2 sum_ij K_ij y_i . y_j`.
+fn quadratic_form(k: &[f64], y: impl Fn(usize) -> Vec3, arity: usize) -> f64 {
+    let mut sum = 0.0;
+    for i in 0..arity {
+        let yi = y(i);
+        let row = &k[i * (i + 1) / 2..][..i + 1];
+        for (j, kij) in row.iter().enumerate().take(i) {
+            sum += kij * yi.dot(&y(j));
+        }
+        sum += 0.5 * row[i] * yi.norm_squared();
+    }
+    sum
+}
+
+/// `out += factor K y`.
+fn product(k: &[f64], y: impl Fn(usize) -> Vec3, factor: f64, out: &mut [Vec3]) {
+    for i in 0..out.len() {
+        let yi = y(i) * factor;
+        let row = &k[i * (i + 1) / 2..][..i + 1];
+        for (j, kij) in row.iter().enumerate().take(i) {
+            out[i] += y(j) * (factor * kij);
+            out[j] += yi * *kij;
+        }
+        out[i] += yi * row[i];
+    }
+}
+
+impl Term for QuadraticBending {
+    fn name(&self) -> &'static str {
+        "quadratic_bending"
+    }
+
+    fn stencils(&self) -> Stencils<'_> {
+        Stencils {
+            arity: self.group.arity,
+            vertices: &self.group.vertices,
+        }
+    }
+
+    fn value(&self, e: usize, at: &Configuration<'_>) -> f64 {
+        let (k, v) = (self.stiffness(e), self.vertices(e));
+        let rate = self.group.fans[e].damping * at.inv_dt;
+        // relative to the centre, so that the sum does not cancel far from the origin
+        let origin = at.x[v[0] as usize];
+        let mut energy = quadratic_form(k, |i| at.x[v[i] as usize] - origin, v.len());
+        if rate > 0.0 {
+            let moved = |i: usize| at.x[v[i] as usize] - at.x0[v[i] as usize];
+            let first = moved(0);
+            energy += rate * quadratic_form(k, |i| moved(i) - first, v.len());
+        }
+        energy
+    }
+
+    fn gradient(&self, e: usize, at: &Configuration<'_>, out: &mut [Vec3]) {
+        let (k, v) = (self.stiffness(e), self.vertices(e));
+        let rate = self.group.fans[e].damping * at.inv_dt;
+        let origin = at.x[v[0] as usize];
+        out.fill(Vec3::zeros());
+        product(k, |i| at.x[v[i] as usize] - origin, 1.0, out);
+        if rate > 0.0 {
+            let moved = |i: usize| at.x[v[i] as usize] - at.x0[v[i] as usize];
+            let first = moved(0);
+            product(k, |i| moved(i) - first, rate, out);
+        }
+    }
+
+    fn hessian(&self, e: usize, at: &Configuration<'_>, _: HessianKind, out: &mut [Mat3]) {
+        let scale = 1.0 + self.group.fans[e].damping * at.inv_dt;
+        for (o, k) in out.iter_mut().zip(self.stiffness(e)) {
+            *o = Mat3::from_diagonal_element(k * scale);
+        }
+    }
+
+    fn rest_gradient(
+        &self,
+        e: usize,
+        at: &Configuration<'_>,
+        change: &RestChange<'_>,
+        out: &mut [Vec3],
+    ) {
+        let (fan, v) = (&self.group.fans[e], self.vertices(e));
+        let fabric = &change.fabrics[fan.fabric];
+        let duv: Vec<Vec2> = v
+            .iter()
+            .map(|&v| fan.rotation * change.uv[v as usize])
+            .collect();
+        let (_, rates) = measure_with_rate(&fan.uv, &duv, fan.closed);
+        let (b, db) = operator(fan, &duv);
+        let area = fan.measure.area;
+        let d = fan.rigidity / area;
+        let dd = rigidity(fabric) / area - d * (rates.area / area);
+        let rate = fan.damping * at.inv_dt;
+        let drate = fabric.damping_stiffness * at.inv_dt;
+        // R and its rate, one column for each coordinate; with damping of the argument below
+        let y = |i: usize| {
+            let (x, x0) = (at.x[v[i] as usize], at.x0[v[i] as usize]);
+            (x - at.x[v[0] as usize]) + (x - x0) * rate
+        };
+        let dy = |i: usize| (at.x[v[i] as usize] - at.x0[v[i] as usize]) * drate;
+        let (mut r, mut dr) = (Mat3::zeros(), Mat3::zeros());
+        for i in 0..v.len() {
+            r += b[i] * y(i).transpose();
+            dr += db[i] * y(i).transpose() + b[i] * dy(i).transpose();
+        }
+        let (d, dd) = (Mat3::from_diagonal(&d), Mat3::from_diagonal(&dd));
+        let (moment, dmoment) = (d * r, dd * r + d * dr);
+        for i in 0..v.len() {
+            out[i] = moment.tr_mul(&db[i]) + dmoment.tr_mul(&b[i]);
+        }
+    }
+}
