@@ -2,6 +2,7 @@
 //! block-sparse matrices, deterministic parallel loops, finite differences.
 
 pub mod block;
+pub mod boxtree;
 pub mod parallel;
 
 /// Point or vector in space, in metres unless said otherwise.
