@@ -89,7 +89,7 @@ pub struct Sim {
 impl Sim {
     /// Triangulates and compiles the garment; its vertices stand where the panels are placed.
     pub fn new(garment: &Garment, options: &SimOptions) -> Result<Self> {
-        garment.check()?;
+        garment.check(options.settings.max_vertices as usize)?;
         if !garment.blend_regions.is_empty() {
             return Err(Error::unsupported(
                 "the garment has a blend region, and this version simulates triangles only",
@@ -108,7 +108,7 @@ impl Sim {
         let cloth = Cloth::new(garment, mesh.clone())?;
         let masses = cloth.masses.clone();
         let fingerprint = snapshot::fingerprint(&cloth);
-        let system = System::new(cloth, &BuildOptions::from(&options.settings));
+        let system = System::new(cloth, &BuildOptions::from(&options.settings))?;
         let state = State {
             time: 0.0,
             positions: mesh.placed.clone(),
@@ -398,7 +398,7 @@ impl Sim {
             let mesh =
                 crate::tri::triangulate(&self.garment, scale, self.settings.max_vertices as usize)?;
             let cloth = Cloth::new(&self.garment, mesh)?;
-            let mut system = System::new(cloth, &BuildOptions::from(&self.settings));
+            let mut system = System::new(cloth, &BuildOptions::from(&self.settings))?;
             for (body, contact) in &self.bodies {
                 let _ = system.bodies.add(body, contact);
             }
@@ -536,9 +536,10 @@ impl Sim {
         if let Some(slot) = world_number(&mut self.state, name) {
             *slot = value;
         } else {
-            self.settings.set(name, value)?;
-            let settings = self.settings.clone();
-            self.engine().set_settings(&settings);
+            let mut settings = self.settings.clone();
+            settings.set(name, value)?;
+            self.engine().set_settings(&settings)?;
+            self.settings = settings;
         }
         self.epoch += 1;
         Ok(())

@@ -5,7 +5,7 @@ mod linear_cases;
 use linear_cases::{Random, add, forces, residual, sewn_cloth};
 use toile::math::block::{BlockMatrix, BlockPattern};
 use toile::math::{Mat3, Vec3};
-use toile::solve::linear::choose::{CROSSOVER, solver};
+use toile::solve::linear::choose::solver;
 use toile::solve::linear::direct::Direct;
 use toile::solve::linear::ic0::{IncompleteCholesky, Order, Storage};
 use toile::solve::linear::jacobi::BlockJacobi;
@@ -278,12 +278,26 @@ fn cuthill_mckee_is_a_permutation_of_small_bandwidth() {
     assert!(case.priorities.contains(&0) && case.priorities.contains(&1));
 }
 
-/// Numbers in the settings choose what they say, and the automatic choice turns at the crossover.
+/// Numbers in the settings choose what they say; the automatic choice follows size and stiffness.
 #[test]
 fn the_choice_follows_its_number() {
-    assert_eq!(solver(1, 10, None).name(), "cholesky");
-    assert_eq!(solver(2, 10, None).name(), "cg_jacobi");
-    assert_eq!(solver(3, 10, Some(&[0; 10])).name(), "cg_ic0");
-    assert_eq!(solver(0, CROSSOVER - 1, None).name(), "cholesky");
-    assert_eq!(solver(0, CROSSOVER, None).name(), "cg_ic0");
+    assert_eq!(solver(1, None).name(), "cholesky");
+    assert_eq!(solver(2, None).name(), "cg_jacobi");
+    assert_eq!(solver(3, Some(&[0; 10])).name(), "cg_ic0");
+    for (n, h, expected) in [
+        (1_600, 1e-2, "cholesky"),
+        (4_900, 1e-3, "cg_ic0"),
+        (4_900, 1e-2, "cholesky"),
+    ] {
+        let case = sewn_cloth(n, 4, h);
+        let b = forces(case.matrix.n(), 1);
+        let mut x = vec![Vec3::zeros(); b.len()];
+        let mut automatic = solver(0, Some(&case.priorities));
+        automatic.prepare(&case.matrix).expect("prepares");
+        assert_eq!(automatic.name(), expected, "{n} vertices, step {h}");
+        automatic
+            .solve(&case.matrix, &b, &mut x, 1e-8)
+            .expect("solves");
+        assert!(residual(&case.matrix, &b, &x) <= 1e-8);
+    }
 }

@@ -40,7 +40,7 @@ fn drapes_to_rest(name: &str, edge_length: f64) {
     }
     println!("{name}: moved {:.3} mm in a further second", 1e3 * moved);
     assert!(moved < 1e-3, "a vertex moved {moved} m in a further second");
-    let edges: Vec<(Vec3, Vec3)> = toile::system::build::unique_edges(sim.triangles())
+    let edges: Vec<(Vec3, Vec3)> = toile::tri::quality::edges(sim.mesh())
         .iter()
         .map(|e| (sim.positions()[e[0] as usize], sim.positions()[e[1] as usize]))
         .collect();

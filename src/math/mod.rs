@@ -4,6 +4,7 @@
 pub mod block;
 pub mod diff;
 pub mod geometry;
+pub mod boxtree;
 pub mod parallel;
 pub mod spd;
 

@@ -69,7 +69,7 @@ impl Engine {
     }
 
     /// Takes changed tunables: threads and the linear solver follow at once.
-    pub fn set_settings(&mut self, settings: &Settings) {
+    pub fn set_settings(&mut self, settings: &Settings) -> Result<()> {
         if settings.threads.to_bits() != self.settings.threads.to_bits() {
             self.workers = Workers::new(settings.threads as usize);
         }
@@ -79,9 +79,10 @@ impl Engine {
                 Some(&self.system.seam_priorities()),
             );
         }
+        self.system.set_options(&settings.into())?;
         self.settings = settings.clone();
-        self.system.set_options(&settings.into());
         self.assembler.rebuild(self.system.cloth.mesh.uv.len(), &self.system.terms);
+        Ok(())
     }
 
     /// Name of the linear solver.

@@ -97,7 +97,9 @@ settings! {
     /// Stiffness of cloth against cloth, pressure per depth.
     self_stiffness: "contact.self.stiffness" = 1e6, 0.0, 1e12, "Pa/m";
     /// Stiffness of the seam springs per length of seam.
-    seam_stiffness: "seam.stiffness" = 2e5, 0.0, 1e12, "N/m^2";
+    seam_stiffness: "seam.stiffness" = 2e5, 1.0, 1e12, "N/m^2";
+    /// Largest force with which an open seam is pulled together, per length of seam.
+    seam_pull: "seam.pull" = 50.0, 1e-3, 1e6, "N/m";
     /// Quadratic drag of the air along the normal, times density of air.
     air_drag: "air.drag" = 1.2, 0.0, 1e3, "kg/m^3";
     /// Tangential drag (skin friction) of the air, times density of air.
@@ -110,6 +112,7 @@ impl From<&Settings> for BuildOptions {
     fn from(s: &Settings) -> Self {
         Self {
             seam_stiffness: s.seam_stiffness,
+            seam_pull: s.seam_pull,
             air_drag: s.air_drag,
             air_tangential: s.air_lift,
             self_contact: s.self_contact > 0.5,

@@ -3,15 +3,15 @@
 //! Kernels run in parallel over chunks of stencils into a buffer; the scatter into vertices and
 //! blocks runs in stencil order, so that the result has the same bits for any number of threads.
 
-use super::term::{Configuration, HessianKind, MAX_ARITY, MAX_BLOCKS, Term};
+use super::term::{Configuration, HessianKind, Term};
 use crate::math::block::{BlockMatrix, BlockPattern};
 use crate::math::parallel::Workers;
 use crate::math::{Mat3, Vec3};
 
-/// Stencils evaluated between two scatters.
-const BATCH: usize = 4096;
+/// Blocks evaluated between two scatters.
+const BATCH_BLOCKS: usize = 40_960;
 /// Stencils of one parallel task.
-const CHUNK: usize = 256;
+const CHUNK: usize = 128;
 /// Set in a slot when the stored block is the transpose of the stencil's block.
 const TRANSPOSED: u32 = 1 << 31;
 
@@ -31,8 +31,8 @@ impl Assembler {
         let mut assembler = Self {
             matrix: BlockMatrix::zeros(BlockPattern::from_stencils(0, |_| {})),
             plans: Vec::new(),
-            gradients: vec![Vec3::zeros(); BATCH * MAX_ARITY],
-            blocks: vec![Mat3::zeros(); BATCH * MAX_BLOCKS],
+            gradients: vec![Vec3::zeros(); BATCH_BLOCKS],
+            blocks: vec![Mat3::zeros(); BATCH_BLOCKS],
         };
         assembler.rebuild(vertex_count, terms);
         assembler
@@ -88,8 +88,9 @@ impl Assembler {
                 continue;
             }
             let block_count = arity * (arity + 1) / 2;
-            for first in (0..count).step_by(BATCH) {
-                let batch = BATCH.min(count - first);
+            let largest = (BATCH_BLOCKS / block_count).max(1);
+            for first in (0..count).step_by(largest) {
+                let batch = largest.min(count - first);
                 workers.chunks(&mut self.gradients[..batch * arity], CHUNK * arity, |c, chunk| {
                     for (k, g) in chunk.chunks_mut(arity).enumerate() {
                         term.gradient(first + c * CHUNK + k, at, g);

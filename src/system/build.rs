@@ -1,11 +1,20 @@
 //! The only place that sees all terms: builds the ones that a garment and its fabrics call for.
 
 use super::bodies::BodySet;
+use super::air::Air;
 use super::contact::body::BodyContact;
+use super::contact::self_contact::SelfContact;
+use super::gravity::Gravity;
+use super::hinge::Hinge;
+use super::membrane::Membrane;
+use super::pressure::Pressure;
+use super::quadratic_bending::QuadraticBending;
+use super::seam_term::{SeamHinge, SeamSprings};
 use super::term::{Bodies, Term};
 use crate::cloth::Cloth;
+use crate::error::Result;
 use crate::math::Vec3;
-use crate::pattern::BendingModel;
+use crate::tri::quality::edges as unique_edges;
 
 /// A compiled garment.
 pub struct System {
@@ -29,6 +38,8 @@ pub struct System {
 pub struct BuildOptions {
     /// Seam stiffness per length [N/m^2].
     pub seam_stiffness: f64,
+    /// Largest pull of an open seam per length [N/m].
+    pub seam_pull: f64,
     /// Normal drag [kg/m^3].
     pub air_drag: f64,
     /// Tangential drag [kg/m^3].
@@ -41,9 +52,9 @@ pub struct BuildOptions {
 
 impl System {
     /// Compiles rest data; bodies come later.
-    pub fn new(cloth: Cloth, options: &BuildOptions) -> Self {
-        let terms = terms(&cloth, options);
-        let edges = unique_edges(&cloth.mesh.triangles);
+    pub fn new(cloth: Cloth, options: &BuildOptions) -> Result<Self> {
+        let terms = terms(&cloth, options)?;
+        let edges = unique_edges(&cloth.mesh);
         let rest_lengths = edges
             .iter()
             .map(|e| (cloth.mesh.uv[e[1] as usize] - cloth.mesh.uv[e[0] as usize]).norm())
@@ -52,7 +63,7 @@ impl System {
         for (d, panel) in damping.iter_mut().zip(&cloth.mesh.vertex_panel) {
             *d = cloth.fabrics[cloth.panel_fabric[*panel as usize]].damping_mass;
         }
-        Self {
+        Ok(Self {
             cloth,
             terms,
             bodies: BodySet::default(),
@@ -60,15 +71,16 @@ impl System {
             rest_lengths,
             damping,
             options: options.clone(),
-        }
+        })
     }
 
     /// Takes changed options; terms that carry them are built anew.
-    pub fn set_options(&mut self, options: &BuildOptions) {
+    pub fn set_options(&mut self, options: &BuildOptions) -> Result<()> {
         if *options != self.options {
+            self.terms = terms(&self.cloth, options)?;
             self.options = options.clone();
-            self.terms = terms(&self.cloth, options);
         }
+        Ok(())
     }
 
     /// Bytes of the mesh and of the rest data, terms not counted.
@@ -144,21 +156,30 @@ impl System {
     }
 }
 
-fn terms(cloth: &Cloth, options: &BuildOptions) -> Vec<Box<dyn Term>> {
-    let mut terms: Vec<Box<dyn Term>> = Vec::new();
-    terms.push(Box::new(BodyContact::new(cloth)));
-    let _ = (options, BendingModel::Hinge);
-    terms
+fn terms(cloth: &Cloth, options: &BuildOptions) -> Result<Vec<Box<dyn Term>>> {
+    let mut terms: Vec<Box<dyn Term>> = vec![
+        Box::new(Gravity::new(cloth)),
+        Box::new(Membrane::new(cloth)),
+        Box::new(BodyContact::new(cloth)),
+    ];
+    for bending in Hinge::terms(cloth) {
+        terms.push(Box::new(bending));
+    }
+    for bending in QuadraticBending::terms(cloth) {
+        terms.push(Box::new(bending));
+    }
+    if cloth.mesh.seams.iter().any(|s| !s.links.is_empty()) {
+        terms.push(Box::new(SeamSprings::new(cloth, options.seam_stiffness, options.seam_pull)));
+        terms.push(Box::new(SeamHinge::new(cloth)));
+    }
+    if options.air_drag > 0.0 || options.air_tangential > 0.0 {
+        terms.push(Box::new(Air::new(cloth, options.air_drag, options.air_tangential)));
+    }
+    terms.push(Box::new(Pressure::new(cloth)));
+    if options.self_contact {
+        let friction = cloth.fabrics.iter().map(|f| f.friction).fold(0.0, f64::max);
+        terms.push(Box::new(SelfContact::new(cloth, options.self_stiffness, friction)?));
+    }
+    Ok(terms)
 }
 
-/// Edges of a triangle list, each once, smaller vertex first, sorted.
-pub fn unique_edges(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
-    let mut edges: Vec<[u32; 2]> = triangles
-        .iter()
-        .flat_map(|t| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]])
-        .map(|[a, b]| [a.min(b), a.max(b)])
-        .collect();
-    edges.sort_unstable();
-    edges.dedup();
-    edges
-}

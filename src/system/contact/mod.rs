@@ -1,3 +1,7 @@
-//! Contact: cloth against bodies.
+//! Contact: cloth against bodies, cloth against itself, and the checks that nothing passed through.
 
 pub mod body;
+pub mod crossing;
+pub mod self_contact;
+pub mod spheres;
+pub mod travel;

@@ -1,0 +1,339 @@
+//! Cloth against cloth: spheres on the vertices press each other apart and rub.
+//!
+//! For a pair at `w = x_b - x_a + c`, `d = |w|`, `d0 = r_a + r_b`:
+//!
+//! * Pressure: `V = 1/2 k (d0 - d)^2` for `d < d0`, else 0. `k` is the stiffness [Pa/m] times the
+//!   mean of the two vertex areas. The force is continuous. Exact Hessian by `x_b`:
+//!   `k n n^T - k (d0 - d) / d (I - n n^T)`; the second part is never positive and is left out of the
+//!   semi-definite one.
+//! * Friction (moving anchors, Hasegawa et al. 2003, as in Umetani et al. 2011, section 7): with the
+//!   tangential offset from the anchor `s = (I - n0 n0^T) (x_b - x_a - o)`, a spring `k |s|^2 / 2` up
+//!   to the force `f = mu lambda`, beyond it `f |s| - f^2 / (2 k)`. The direction `n0`, the normal
+//!   force `lambda` and the anchor `o` are those of the start of the step (lagged, so this is a
+//!   convex potential within the step). After an accepted step the anchor is drawn along so far
+//!   that the spring's force is at most `mu lambda`. A pair rubs from its second step on. The
+//!   anchor does not turn with the cloth: a fold turning as a whole feels friction up to the same
+//!   bound.
+//!
+//! `c` is zero except for pairs that meet in a plane: coincident panels have no side to be pushed
+//! to. Then `c` points along the outside normal of the cloth at `a` (or against it, where `b` already
+//! is on that side), 0.02 `d0` long: enough for the forces to have a way out.
+//!
+//! Spheres do not slip off each other's cloth as planes would: layers feel a bumpy surface, with
+//! bumps of the order of the square of the edge length over the radius. Layers lie `d0` apart at
+//! most. Crossed cloth is not uncrossed.
+
+use super::spheres::{Grid, Spheres};
+use super::travel;
+use crate::cloth::Cloth;
+use crate::error::{Error, Result};
+use crate::math::{Mat3, Vec3};
+use crate::system::state::{PairAnchor, State};
+use crate::system::term::{Configuration, HessianKind, Stencils, Term};
+
+/// Reserve of the spheres, see [`Spheres`].
+pub const RESERVE: f64 = 0.15;
+/// Height of `w` over the tangent plane, by `d0`, below which a pair counts as meeting in a plane.
+const FLAT: f64 = 0.02;
+/// Part of a radius that a vertex may move in a step beside what its velocity tells.
+const SLACK: f64 = 0.15;
+
+/// One pair of spheres.
+#[derive(Clone, Copy, Debug)]
+struct Pair {
+    /// `d0` [m].
+    distance: f64,
+    /// `k` [N/m].
+    stiffness: f64,
+    /// `c` [m].
+    bias: Vec3,
+    /// `n0`, at the start of the step.
+    normal: Vec3,
+    /// `o` [m], meaningful if `rubs`.
+    anchor: Vec3,
+    /// `mu lambda` [N].
+    bound: f64,
+    rubs: bool,
+}
+
+/// The term.
+pub struct SelfContact {
+    spheres: Spheres,
+    triangles: Vec<[u32; 3]>,
+    areas: Vec<f64>,
+    stiffness: f64,
+    friction: f64,
+    stencils: Vec<u32>,
+    pairs: Vec<Pair>,
+    // Work memory of `begin_step`.
+    grid: Grid,
+    reach: Vec<f64>,
+    normals: Vec<Vec3>,
+    found: Vec<[u32; 2]>,
+}
+
+impl SelfContact {
+    /// `stiffness` is pressure per depth [Pa/m], `friction` Coulomb's.
+    pub fn new(cloth: &Cloth, stiffness: f64, friction: f64) -> Result<Self> {
+        for (what, value) in [("stiffness", stiffness), ("friction", friction)] {
+            if !(value.is_finite() && value >= 0.0) {
+                return Err(Error::argument(format!(
+                    "{what} of cloth on cloth {value} must not be negative"
+                )));
+            }
+        }
+        Ok(Self {
+            spheres: Spheres::new(cloth, RESERVE)?,
+            triangles: cloth.mesh.triangles.clone(),
+            areas: cloth.vertex_areas.clone(),
+            stiffness,
+            friction,
+            stencils: Vec::new(),
+            pairs: Vec::new(),
+            grid: Grid::default(),
+            reach: Vec::new(),
+            normals: Vec::new(),
+            found: Vec::new(),
+        })
+    }
+
+    /// Radii and excluded pairs.
+    pub fn spheres(&self) -> &Spheres {
+        &self.spheres
+    }
+
+    /// Largest part (0 to 1) of the way from `x0` to `x` on which no cloth can have passed through
+    /// cloth.
+    pub fn max_travel(&self, x0: &[Vec3], x: &[Vec3]) -> f64 {
+        travel::max_travel(&self.spheres, x0, x)
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.spheres.bytes()
+            + self.grid.bytes()
+            + 12 * self.triangles.len()
+            + 8 * (self.areas.len() + self.reach.len() + self.found.len())
+            + 24 * self.normals.len()
+            + 4 * self.stencils.len()
+            + size_of::<Pair>() * self.pairs.len()
+    }
+
+    /// `w`, its length and its direction; along the bias, or the lagged normal, where `w` vanishes.
+    fn offset(&self, e: usize, x: &[Vec3]) -> (f64, Vec3) {
+        let pair = &self.pairs[e];
+        let w = self.plain_offset(e, x) + pair.bias;
+        let d = w.norm();
+        if d > 1e-12 * pair.distance {
+            (d, w / d)
+        } else {
+            (d, pair.normal)
+        }
+    }
+
+    fn plain_offset(&self, e: usize, x: &[Vec3]) -> Vec3 {
+        x[self.stencils[2 * e + 1] as usize] - x[self.stencils[2 * e] as usize]
+    }
+
+    /// Tangential offset from the anchor.
+    fn slip(&self, e: usize, x: &[Vec3]) -> Vec3 {
+        let pair = &self.pairs[e];
+        let s = self.plain_offset(e, x) - pair.anchor;
+        s - pair.normal * pair.normal.dot(&s)
+    }
+
+    /// Outside normals at the vertices, weighted by area; zero where there is none.
+    fn update_normals(&mut self, x: &[Vec3]) {
+        self.normals.clear();
+        self.normals.resize(x.len(), Vec3::zeros());
+        for &t in &self.triangles {
+            let [a, b, c] = t.map(|v| x[v as usize]);
+            let n = (b - a).cross(&(c - a));
+            for v in t {
+                self.normals[v as usize] += n;
+            }
+        }
+        for n in &mut self.normals {
+            *n = n.try_normalize(1e-30).unwrap_or_else(Vec3::zeros);
+        }
+    }
+
+    /// Pairs that may touch within the step, sorted.
+    fn find_pairs(&mut self, state: &State, dt: f64) {
+        let (x, v) = (&state.positions, &state.velocities);
+        let mean = v.iter().sum::<Vec3>() / (v.len().max(1) as f64);
+        self.reach.clear();
+        for (r, v) in self.spheres.radii.iter().zip(v) {
+            let travel = 1.5 * (v - mean).norm() * dt + SLACK * r;
+            self.reach.push(r + travel.min(*r));
+        }
+        let (spheres, found) = (&self.spheres, &mut self.found);
+        found.clear();
+        self.grid.pairs(x, &self.reach, |a, b| {
+            let [ra, rb] = [a, b].map(|i| spheres.radii[i as usize]);
+            let approach = 1.5 * (v[b as usize] - v[a as usize]).norm() * dt;
+            let margin = (approach + SLACK * (ra + rb)).min(ra + rb);
+            let far = ra + rb + margin;
+            if (x[b as usize] - x[a as usize]).norm_squared() < far * far && !spheres.excluded(a, b)
+            {
+                found.push([a, b]);
+            }
+        });
+        found.sort_unstable();
+    }
+
+    fn pair(&self, [a, b]: [u32; 2], x: &[Vec3], anchor: Option<&PairAnchor>) -> Pair {
+        let distance = self.spheres.rest_distance(a, b);
+        let w = x[b as usize] - x[a as usize];
+        let outside = match self.normals[a as usize] {
+            n if n == Vec3::zeros() => Vec3::y(),
+            n => n,
+        };
+        let height = w.dot(&outside);
+        let bias = if height.abs() < FLAT * distance && w.norm() < distance {
+            let below = height < -1e-9 * distance;
+            outside * (FLAT * distance * if below { -1.0 } else { 1.0 })
+        } else {
+            Vec3::zeros()
+        };
+        Pair {
+            distance,
+            stiffness: self.stiffness * 0.5 * (self.areas[a as usize] + self.areas[b as usize]),
+            bias,
+            normal: (w + bias).try_normalize(1e-300).unwrap_or(outside),
+            anchor: anchor.map_or(w, |p| p.offset),
+            bound: anchor.map_or(0.0, |p| self.friction * p.normal_force),
+            rubs: anchor.is_some(),
+        }
+    }
+}
+
+impl Term for SelfContact {
+    fn name(&self) -> &'static str {
+        "self_contact"
+    }
+
+    fn stencils(&self) -> Stencils<'_> {
+        Stencils {
+            arity: 2,
+            vertices: &self.stencils,
+        }
+    }
+
+    fn value(&self, e: usize, at: &Configuration<'_>) -> f64 {
+        let pair = &self.pairs[e];
+        let (d, _) = self.offset(e, at.x);
+        let depth = (pair.distance - d).max(0.0);
+        let mut energy = 0.5 * pair.stiffness * depth * depth;
+        if pair.rubs && pair.bound > 0.0 {
+            let s = self.slip(e, at.x).norm();
+            energy += if pair.stiffness * s <= pair.bound {
+                0.5 * pair.stiffness * s * s
+            } else {
+                pair.bound * (s - 0.5 * pair.bound / pair.stiffness)
+            };
+        }
+        energy
+    }
+
+    fn gradient(&self, e: usize, at: &Configuration<'_>, out: &mut [Vec3]) {
+        let pair = &self.pairs[e];
+        let (d, n) = self.offset(e, at.x);
+        let mut g = n * (-pair.stiffness * (pair.distance - d).max(0.0));
+        if pair.rubs && pair.bound > 0.0 {
+            let s = self.slip(e, at.x);
+            let force = pair.stiffness * s.norm();
+            g += s * (pair.stiffness * (pair.bound / force.max(pair.bound)));
+        }
+        out[0] = -g;
+        out[1] = g;
+    }
+
+    fn hessian(&self, e: usize, at: &Configuration<'_>, kind: HessianKind, out: &mut [Mat3]) {
+        let pair = &self.pairs[e];
+        let k = pair.stiffness;
+        let (d, n) = self.offset(e, at.x);
+        let mut h = Mat3::zeros();
+        if d < pair.distance {
+            let along = n * n.transpose();
+            h += along * k;
+            // At d = 0 the force has no derivative; the part that would be infinite is left out.
+            if kind == HessianKind::Exact && d > 1e-12 * pair.distance {
+                h -= (Mat3::identity() - along) * (k * (pair.distance - d) / d);
+            }
+        }
+        if pair.rubs && pair.bound > 0.0 {
+            let s = self.slip(e, at.x);
+            let length = s.norm();
+            let tangent = Mat3::identity() - pair.normal * pair.normal.transpose();
+            if k * length <= pair.bound {
+                h += tangent * k;
+            } else {
+                let s = s / length;
+                h += (tangent - s * s.transpose()) * (pair.bound / length);
+            }
+        }
+        out[0] = h;
+        out[1] = -h;
+        out[2] = h;
+    }
+
+    /// Friction anchors do not turn with the cloth.
+    fn is_internal(&self) -> bool {
+        false
+    }
+
+    fn begin_step(&mut self, state: &State, at: &Configuration<'_>) -> bool {
+        let dt = if at.inv_dt > 0.0 {
+            1.0 / at.inv_dt
+        } else {
+            0.0
+        };
+        self.update_normals(&state.positions);
+        self.find_pairs(state, dt);
+        let changed = self.stencils.as_slice() != self.found.as_flattened();
+        if changed {
+            self.stencils.clear();
+            self.stencils.extend_from_slice(self.found.as_flattened());
+        }
+        let found = std::mem::take(&mut self.found);
+        self.pairs.clear();
+        let mut anchors = state.pair_anchors.iter().peekable();
+        for &[a, b] in &found {
+            while anchors.next_if(|p| (p.a, p.b) < (a, b)).is_some() {}
+            let anchor = anchors.next_if(|p| (p.a, p.b) == (a, b));
+            self.pairs.push(self.pair([a, b], &state.positions, anchor));
+        }
+        self.found = found;
+        changed
+    }
+
+    fn accept(&mut self, at: &Configuration<'_>, state: &mut State) {
+        state.pair_anchors.clear();
+        for e in 0..self.pairs.len() {
+            let pair = &self.pairs[e];
+            let (d, _) = self.offset(e, at.x);
+            if d >= pair.distance {
+                continue;
+            }
+            let w = self.plain_offset(e, at.x);
+            let mut offset = w;
+            if pair.rubs {
+                let s = self.slip(e, at.x);
+                let force = pair.stiffness * s.norm();
+                let kept = if force > pair.bound {
+                    pair.bound / force
+                } else {
+                    1.0
+                };
+                offset -= s * kept;
+            }
+            state.pair_anchors.push(PairAnchor {
+                a: self.stencils[2 * e],
+                b: self.stencils[2 * e + 1],
+                offset,
+                normal_force: pair.stiffness * (pair.distance - d),
+            });
+        }
+    }
+}
