@@ -65,6 +65,7 @@ pub struct SystemInfo {
 /// A garment in a world.
 pub struct Sim {
     garment: Garment,
+    mesh: crate::tri::GarmentMesh,
 }
 
 impl Sim {
@@ -72,6 +73,7 @@ impl Sim {
     pub fn new(garment: &Garment, _options: &SimOptions) -> Result<Self> {
         Ok(Self {
             garment: garment.clone(),
+            mesh: Default::default(),
         })
     }
     /// The garment that was compiled.
@@ -169,16 +171,16 @@ impl Sim {
         &[]
     }
     /// Energies of the present state.
-    pub fn energies(&self) -> Energies {
-        Energies::default()
+    pub fn energies(&self) -> Result<Energies> {
+        Ok(Energies::default())
     }
     /// Numbers of the present state without advancing it (`outcome` converged, counts zero).
-    pub fn report(&self) -> Option<StepReport> {
-        None
+    pub fn report(&self) -> Result<StepReport> {
+        Err(Error::unsupported("report"))
     }
     /// The state as bytes.
-    pub fn save(&self) -> Vec<u8> {
-        Vec::new()
+    pub fn save(&self) -> Result<Vec<u8>> {
+        Ok(Vec::new())
     }
     /// Restores saved bytes of the same garment and bodies; on error nothing changes.
     pub fn restore(&mut self, _bytes: &[u8]) -> Result<()> {
@@ -193,7 +195,20 @@ impl Sim {
         Err(Error::unsupported("number"))
     }
     /// What was built and what it costs.
-    pub fn info(&self) -> Option<SystemInfo> {
-        None
+    pub fn info(&self) -> SystemInfo {
+        SystemInfo {
+            vertices: 0,
+            triangles: 0,
+            unknowns: 0,
+            terms: vec![],
+            bytes: 0,
+            factor_bytes: 0,
+            min_angle: 0.0,
+            backend: String::new(),
+        }
+    }
+    /// The triangulated garment.
+    pub fn mesh(&self) -> &crate::tri::GarmentMesh {
+        &self.mesh
     }
 }

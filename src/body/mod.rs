@@ -4,6 +4,8 @@
 //! A [`Shape`] is immutable and shared; a pose (and, for a deforming mesh, a changed field) belongs
 //! to the simulation's State.
 
+pub mod mannequin;
+
 use crate::math::{Mat3, Rotation, Vec3};
 
 /// Signed distance and its derivatives at a point of the body's own frame.

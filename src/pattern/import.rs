@@ -1,1 +1,0 @@
-//! Patterns from files: toile's own JSON, GarmentCode specifications.
