@@ -24,6 +24,8 @@ pub(crate) struct Frame {
     pub(crate) half: [f64; 3],
     /// Lowest point of everything along `up` [m].
     pub(crate) lowest: f64,
+    /// Highest point of everything along `up` [m].
+    pub(crate) highest: f64,
     /// Bounding sphere of everything: middle, radius [m].
     pub(crate) ball: (Vec3, f64),
 }
@@ -69,6 +71,7 @@ impl Frame {
             centre,
             half: [0, 1, 2].map(|k| (0.5 * (hi[k] - lo[k])).max(1e-3)),
             lowest: all.0[1],
+            highest: all.1[1],
             ball: (centre, reach.max(1e-3) * 1.35),
         }
     }
@@ -99,7 +102,7 @@ impl Camera {
         let margin = 1.10;
         let distance = frame.half[1].max(frame.half[0]).max(frame.half[2]) * margin / TAN_HALF;
         let near = |a: f64| distance / (distance - half_depth(a)).max(0.2 * distance);
-        let gap = 0.10 * views.iter().map(|&a| half_width(a)).fold(0.0, f64::max);
+        let gap = 0.05 * views.iter().map(|&a| half_width(a)).fold(0.0, f64::max);
         let wants: Vec<f64> = views
             .iter()
             .map(|&a| 2.0 * (half_width(a) * near(a) + gap))
@@ -113,6 +116,17 @@ impl Camera {
         // pixels for one metre at the middle of the scene
         let scale = (width as f64 / total).min(height as f64 / tall);
         let spare = (width as f64 - scale * total) / n;
+        // spare height shows more of the body
+        let shown = 0.5 * height as f64 / (scale * margin);
+        let middle = frame.centre.dot(&frame.up);
+        let lift = if 2.0 * shown >= frame.highest - frame.lowest {
+            0.5 * (frame.highest + frame.lowest) - middle
+        } else {
+            let down = (middle - shown - frame.lowest).min(0.0);
+            let up = (middle + shown - frame.highest).max(0.0);
+            -(up + down)
+        };
+        let target = frame.centre + frame.up * lift;
         let mut left = 0.0;
         let mut out = Vec::new();
         for (&a, want) in views.iter().zip(&wants) {
@@ -124,7 +138,7 @@ impl Camera {
             let forward = -direction;
             let right = forward.cross(&frame.up).normalize();
             out.push(Self {
-                eye: frame.centre + direction * distance,
+                eye: target + direction * distance,
                 right,
                 up: right.cross(&forward),
                 forward,

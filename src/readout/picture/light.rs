@@ -13,8 +13,9 @@ use crate::math::Vec3;
 use crate::math::parallel::Workers;
 
 const MAP: usize = 448;
-const SKY_DIRECTIONS: usize = 56;
-const KEY_DIRECTIONS: usize = 9;
+const GROUP: usize = 9;
+const SKY_DIRECTIONS: usize = 6 * GROUP;
+const KEY_DIRECTIONS: usize = GROUP;
 const FLOOR_CELLS: usize = 96;
 
 /// The ground as a grid that catches shadows.
@@ -78,88 +79,128 @@ impl Floor {
 
 /// Light at the vertices of a scene and of its floor.
 pub(crate) struct Light {
-    /// Direction to the key lamp.
-    pub(crate) key_direction: Vec3,
     /// Sky light on the side of the normal and on the other, shape `[vertex_count]`.
     pub(crate) sky: Vec<[f32; 2]>,
-    /// Share of the key lamp that is visible, shape `[vertex_count]`, both sides.
-    pub(crate) key: Vec<[f32; 2]>,
     /// Sky on the floor's grid.
     pub(crate) floor_sky: Vec<f32>,
-    /// Key on the floor's grid.
-    pub(crate) floor_key: Vec<f32>,
+    /// The key lamp of each view.
+    pub(crate) lamps: Vec<Lamp>,
 }
 
-/// Sums of one direction: sky of both sides, key of both sides.
-type Sums = [f32; 4];
+/// A key lamp; it turns with the view, so that every side is seen well lit.
+pub(crate) struct Lamp {
+    /// Unit vector to the lamp.
+    pub(crate) direction: Vec3,
+    /// Visible share of the lamp at each vertex.
+    pub(crate) visible: Vec<f32>,
+    /// Visible share of the lamp on the floor's grid.
+    pub(crate) floor: Vec<f32>,
+}
+
+/// One direction of light and what it counts for.
+struct Ray {
+    direction: Vec3,
+    sky: f32,
+    lamp: usize,
+}
 
 impl Light {
-    pub(crate) fn new(scene: &Scene, floor: &Floor, frame: &Frame, workers: &Workers) -> Self {
+    pub(crate) fn new(
+        scene: &Scene,
+        floor: &Floor,
+        frame: &Frame,
+        views: &[f64],
+        workers: &Workers,
+    ) -> Self {
         let axes = (frame.side, frame.up, frame.front);
         let world = |d: [f64; 3]| axes.0 * d[0] + axes.1 * d[1] + axes.2 * d[2];
-        let key_direction = world([-0.45, 0.95, 0.62]).normalize();
         // sky: golden-angle points over the upper hemisphere, a little below the horizon too
         let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
-        let mut directions: Vec<(Vec3, f32, f32)> = (0..SKY_DIRECTIONS)
+        let mut rays: Vec<Ray> = (0..SKY_DIRECTIONS)
             .map(|i| {
                 let y = 1.0 - 1.12 * (i as f64 + 0.5) / SKY_DIRECTIONS as f64;
                 let r = (1.0 - y * y).max(0.0).sqrt();
                 let a = golden * i as f64;
-                let w = (1.0 + 2.0 * y.max(0.0)) / 3.0;
-                (world([r * a.cos(), y, r * a.sin()]), w as f32, 0.0)
+                Ray {
+                    direction: world([r * a.cos(), y, r * a.sin()]),
+                    sky: ((1.0 + 2.0 * y.max(0.0)) / 3.0) as f32,
+                    lamp: usize::MAX,
+                }
             })
             .collect();
-        let t = key_direction.cross(&axes.1).normalize();
-        let b = key_direction.cross(&t);
-        for i in 0..KEY_DIRECTIONS {
-            let r = 0.11 * ((i as f64 + 0.5) / KEY_DIRECTIONS as f64).sqrt();
-            let a = golden * i as f64;
-            let d = (key_direction + t * (r * a.cos()) + b * (r * a.sin())).normalize();
-            directions.push((d, 0.0, 1.0 / KEY_DIRECTIONS as f32));
+        let mut lamps = Vec::new();
+        for (lamp, &view) in views.iter().enumerate() {
+            let (s, c) = view.sin_cos();
+            let [x, y, z] = [-0.52, 0.95, 0.66];
+            let direction = world([x * c + z * s, y, z * c - x * s]).normalize();
+            let t = direction.cross(&axes.1).normalize();
+            let b = direction.cross(&t);
+            for i in 0..KEY_DIRECTIONS {
+                let r = 0.11 * ((i as f64 + 0.5) / KEY_DIRECTIONS as f64).sqrt();
+                let a = golden * i as f64;
+                rays.push(Ray {
+                    direction: (direction + t * (r * a.cos()) + b * (r * a.sin())).normalize(),
+                    sky: 0.0,
+                    lamp,
+                });
+            }
+            lamps.push(direction);
         }
-        let open: f32 = directions
+        let open: f32 = rays
             .iter()
-            .map(|(d, w, _)| w * d.dot(&axes.1).max(0.0) as f32)
+            .map(|r| r.sky * r.direction.dot(&axes.1).max(0.0) as f32)
             .sum();
         let n = scene.positions.len();
         let m = floor.points.len();
-        // directions in fixed groups, added in order: the same bits for any number of threads
-        const GROUP: usize = 9;
-        let mut groups: Vec<Vec<Sums>> = vec![Vec::new(); directions.len().div_ceil(GROUP)];
+        // rays in fixed groups, added in order: the same bits for any number of threads
+        let mut groups: Vec<Vec<[f32; 2]>> = vec![Vec::new(); rays.len().div_ceil(GROUP)];
         workers.chunks(&mut groups, 1, |g, out| {
-            let mut sums = vec![[0.0; 4]; n + m];
+            let mut sums = vec![[0.0; 2]; n + m];
             let mut map = Map::new(frame);
-            for (d, sky, key) in directions.iter().skip(g * GROUP).take(GROUP) {
+            for ray in rays.iter().skip(g * GROUP).take(GROUP) {
+                let d = &ray.direction;
                 map.draw(scene, d);
                 for v in 0..n {
                     let c = scene.normals[v].dot(d);
-                    let side = usize::from(c < 0.0);
-                    // a surface is lifted off itself toward the lamp
+                    // a surface is lifted off itself toward the light
                     let lift = scene.normals[v] * (map.lift * c.signum());
                     if map.sees(&(scene.positions[v] + lift)) {
-                        sums[v][side] += sky * c.abs() as f32;
-                        sums[v][2 + side] += key;
+                        if ray.lamp == usize::MAX {
+                            sums[v][usize::from(c < 0.0)] += ray.sky * c.abs() as f32;
+                        } else {
+                            sums[v][0] += 1.0 / KEY_DIRECTIONS as f32;
+                        }
                     }
                 }
+                let c = d.dot(&axes.1) as f32;
                 for (k, p) in floor.points.iter().enumerate() {
-                    let c = d.dot(&axes.1) as f32;
                     if c > 0.0 && map.sees(&(p + axes.1 * map.lift)) {
-                        sums[n + k][0] += sky * c;
-                        sums[n + k][2] += key;
+                        sums[n + k][0] += if ray.lamp == usize::MAX {
+                            ray.sky * c
+                        } else {
+                            1.0 / KEY_DIRECTIONS as f32
+                        };
                     }
                 }
             }
             out[0] = sums;
         });
-        let total = |i: usize, k: usize| groups.iter().map(|g| g[i][k]).sum::<f32>();
+        // a lamp's rays fill whole groups of their own, after those of the sky
+        let sky_groups = SKY_DIRECTIONS / GROUP;
+        let sky =
+            |i: usize, k: usize| groups[..sky_groups].iter().map(|g| g[i][k]).sum::<f32>() / open;
         Self {
-            key_direction,
-            sky: (0..n)
-                .map(|v| [total(v, 0) / open, total(v, 1) / open])
+            sky: (0..n).map(|v| [sky(v, 0), sky(v, 1)]).collect(),
+            floor_sky: (n..n + m).map(|v| sky(v, 0)).collect(),
+            lamps: lamps
+                .into_iter()
+                .zip(&groups[sky_groups..])
+                .map(|(direction, g)| Lamp {
+                    direction,
+                    visible: g[..n].iter().map(|s| s[0]).collect(),
+                    floor: g[n..].iter().map(|s| s[0]).collect(),
+                })
                 .collect(),
-            key: (0..n).map(|v| [total(v, 2), total(v, 3)]).collect(),
-            floor_sky: (n..n + m).map(|v| total(v, 0) / open).collect(),
-            floor_key: (n..n + m).map(|v| total(v, 2)).collect(),
         }
     }
 }

@@ -148,10 +148,11 @@ pub fn render(parts: &[Part], options: &PictureOptions) -> Result<Picture> {
     let frame = Frame::of(parts, &up, &front);
     let ground = options.ground.unwrap_or(frame.lowest);
     let floor = light::Floor::new(&frame, ground);
-    let lit = light::Light::new(&scene, &floor, &frame, &workers);
+    let lit = light::Light::new(&scene, &floor, &frame, &options.views, &workers);
     let mut canvas = shade::Canvas::new(width * SUB, height * SUB);
-    for camera in Camera::fit_all(&frame, &options.views, width * SUB, height * SUB) {
-        canvas.draw(&scene, &floor, &lit, &camera, &workers);
+    let cameras = Camera::fit_all(&frame, &options.views, width * SUB, height * SUB);
+    for (camera, lamp) in cameras.iter().zip(&lit.lamps) {
+        canvas.draw(&scene, &floor, &lit, lamp, camera, &workers);
     }
     Ok(canvas.resolve(SUB))
 }

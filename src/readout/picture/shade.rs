@@ -5,7 +5,7 @@
 //! that cloth stays cloth. Lines darken by coverage; outlines are drawn where the depth jumps.
 
 use super::camera::Camera;
-use super::light::{Floor, Light};
+use super::light::{Floor, Lamp, Light};
 use super::raster::{Buffer, NONE};
 use super::{Picture, Scene, palette};
 use crate::math::Vec3;
@@ -49,6 +49,7 @@ impl Canvas {
         scene: &Scene,
         floor: &Floor,
         light: &Light,
+        lamp: &Lamp,
         camera: &Camera,
         workers: &Workers,
     ) {
@@ -73,9 +74,9 @@ impl Canvas {
                 let ray = camera.ray(x as f64 + 0.5, y as f64 + 0.5);
                 let t = buffer.triangle[i];
                 let mut c = if t == NONE {
-                    ground(row[x], floor, light, camera, &ray)
+                    ground(row[x], floor, light, lamp, camera, &ray, x)
                 } else {
-                    surface(scene, light, camera, &ray, t)
+                    surface(scene, light, lamp, camera, &ray, t)
                 };
                 let dark = ink[i].max(outline(buffer, camera, x, y));
                 for k in 0..3 {
@@ -154,7 +155,14 @@ impl Canvas {
     }
 }
 
-fn surface(scene: &Scene, light: &Light, camera: &Camera, ray: &Vec3, t: u32) -> [f32; 3] {
+fn surface(
+    scene: &Scene,
+    light: &Light,
+    lamp: &Lamp,
+    camera: &Camera,
+    ray: &Vec3,
+    t: u32,
+) -> [f32; 3] {
     let tri = scene.triangles[t as usize].map(|v| v as usize);
     let [a, b, c] = tri.map(|v| scene.positions[v]);
     // barycentric weights of the ray's point (Moller and Trumbore)
@@ -183,8 +191,8 @@ fn surface(scene: &Scene, light: &Light, camera: &Camera, ray: &Vec3, t: u32) ->
     }
     let mix = |f: &dyn Fn(usize) -> f32| -> f32 { (0..3).map(|k| w[k] as f32 * f(tri[k])).sum() };
     let sky = mix(&|v| light.sky[v][side]);
-    let key = mix(&|v| light.key[v][side]);
-    let l = light.key_direction;
+    let key = mix(&|v| lamp.visible[v]);
+    let l = lamp.direction;
     let facing = n.dot(&l).max(0.0) as f32;
     let fill = 0.10 + 0.10 * n.dot(&view).max(0.0) as f32;
     let half = (l + view).normalize();
@@ -198,12 +206,20 @@ fn surface(scene: &Scene, light: &Light, camera: &Camera, ray: &Vec3, t: u32) ->
     let sky_tint = [0.93, 0.98, 1.08];
     let key_tint = [1.06, 1.0, 0.92];
     [0, 1, 2].map(|k| {
-        let e = 0.72 * sky * sky_tint[k] + 0.62 * facing * key * key_tint[k] + fill;
+        let e = 0.74 * sky * sky_tint[k] + 0.78 * facing * key * key_tint[k] + fill;
         base[k] * inside * e + sheen + velvet * (0.5 + 0.5 * base[k])
     })
 }
 
-fn ground(behind: [f32; 3], floor: &Floor, light: &Light, camera: &Camera, ray: &Vec3) -> [f32; 3] {
+fn ground(
+    behind: [f32; 3],
+    floor: &Floor,
+    light: &Light,
+    lamp: &Lamp,
+    camera: &Camera,
+    ray: &Vec3,
+    column: usize,
+) -> [f32; 3] {
     let down = ray.dot(&floor.up);
     let height = (camera.eye - floor.origin).dot(&floor.up);
     if down >= -1e-9 || height <= 0.0 {
@@ -211,9 +227,14 @@ fn ground(behind: [f32; 3], floor: &Floor, light: &Light, camera: &Camera, ray: 
     }
     let x = camera.eye + ray * (height / -down);
     let (sky, inside) = floor.sample(&light.floor_sky, &x);
-    let (key, _) = floor.sample(&light.floor_key, &x);
+    let (key, _) = floor.sample(&lamp.floor, &x);
     let lit = (0.62 * sky.min(1.0) + 0.38 * key).clamp(0.0, 1.0);
-    let dark = 1.0 - inside * 0.75 * (1.0 - lit);
+    // shadows fade out toward the neighbouring view
+    let [left, right] = camera.columns;
+    let border = (column - left).min(right - 1 - column) as f32;
+    let fade = (border / (0.16 * (right - left) as f32)).clamp(0.0, 1.0);
+    let fade = fade * fade * (3.0 - 2.0 * fade);
+    let dark = 1.0 - inside * fade * 0.75 * (1.0 - lit);
     behind.map(|c| c * dark)
 }
 
