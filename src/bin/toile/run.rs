@@ -78,6 +78,7 @@ pub(crate) fn run(args: &RunArgs) -> Done {
     };
     summary.wall_seconds = start.elapsed().as_secs_f64();
     summary.simulated_seconds = sim.time() - origin;
+    summary.measure_memory();
     write(&args.out, &scene, &sim, &frames, &mut summary)?;
     if args.verify {
         summary.further_second_motion = Some(further_second(&mut sim)?);
