@@ -11,6 +11,7 @@ pub mod pattern;
 pub mod readout;
 pub mod scene;
 pub mod sim;
+pub mod sim_scene;
 pub mod solve;
 pub mod system;
 pub mod tri;

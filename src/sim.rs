@@ -452,7 +452,7 @@ impl Sim {
 
     /// Unit vertex normals, pointing to the outside of the cloth.
     pub fn normals(&self) -> Vec<Vec3> {
-        surface::vertex_normals(&self.state.positions, &self.mesh.triangles)
+        surface::normals(&self.state.positions, &self.mesh.triangles)
     }
 
     /// Vertex triples.

@@ -1,2 +1,0 @@
-//! toile
-fn main() {}

@@ -1,0 +1,89 @@
+//! The command line.
+
+use clap::{Args, Parser, Subcommand};
+use std::path::PathBuf;
+
+/// Sews, drapes and moves garments.
+#[derive(Parser)]
+#[command(
+    version,
+    after_help = "Exit codes: 0 done; 1 scene refused or problems found; 2 wrong command line; \
+                  3 no admissible state found; 4 a result could not be written."
+)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Subcommand)]
+pub(crate) enum Command {
+    /// Drapes and runs a scene; writes summary, models, pattern and a picture.
+    Run(RunArgs),
+    /// Builds a scene and prints what it costs in unknowns and bytes.
+    Info(SceneArgs),
+    /// Lists every problem of a scene with its place; exit code 1 if there are any.
+    Check(SceneArgs),
+    /// Prints every key of scene files: type, unit, default, meaning.
+    Schema {
+        /// As a JSON Schema document (draft 2020-12).
+        #[arg(long)]
+        json: bool,
+    },
+    /// Writes the mannequin that comes with toile as an OBJ file.
+    Mannequin {
+        /// File to write.
+        out: PathBuf,
+        /// Cell of its distance field [m]; 0 chooses.
+        #[arg(long, default_value_t = 0.0)]
+        cell: f64,
+    },
+}
+
+/// What to read.
+#[derive(Args)]
+pub(crate) struct SceneArgs {
+    /// Scene file, toile garment file or GarmentCode specification (JSON).
+    pub(crate) scene: PathBuf,
+    /// Closed body mesh in metres (OBJ), added to the scene's bodies.
+    #[arg(long, value_name = "BODY.obj")]
+    pub(crate) body: Option<PathBuf>,
+    /// Factor from the body file's coordinates to metres.
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
+    pub(crate) body_scale: f64,
+    /// Target edge length of every panel [m].
+    #[arg(long, value_name = "M")]
+    pub(crate) edge_length: Option<f64>,
+    /// Worker threads; results do not depend on it.
+    #[arg(long, value_name = "N")]
+    pub(crate) threads: Option<u32>,
+    /// Sets a number by dotted name; `toile schema` lists the names.
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = assignment)]
+    pub(crate) set: Vec<(String, f64)>,
+}
+
+/// How to run.
+#[derive(Args)]
+pub(crate) struct RunArgs {
+    #[command(flatten)]
+    pub(crate) scene: SceneArgs,
+    /// Folder for the results; made if it is not there.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// Neither progress nor table.
+    #[arg(long)]
+    pub(crate) quiet: bool,
+    /// Simulates one further second and reports the largest motion in it.
+    #[arg(long)]
+    pub(crate) verify: bool,
+}
+
+fn assignment(text: &str) -> Result<(String, f64), String> {
+    let (name, value) = text
+        .split_once('=')
+        .ok_or_else(|| format!("'{text}' is not NAME=VALUE"))?;
+    let value = value
+        .trim()
+        .parse()
+        .map_err(|_| format!("'{value}' is not a number"))?;
+    Ok((name.trim().to_owned(), value))
+}

@@ -1,0 +1,47 @@
+//! `toile`: runs, checks and explains scenes.
+//!
+//! Exit codes: 0 done; 1 the scene or a file of it was refused (or `check` found problems); 2 the
+//! command line was wrong; 3 the simulation found no admissible state; 4 a result could not be
+//! written. A drape that stops at its iteration limit ends with 0 and says so in `outcome`.
+
+mod args;
+mod info;
+mod output;
+mod run;
+mod summary;
+
+use args::{Cli, Command};
+use clap::Parser;
+use output::{Failure, out};
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(e) => {
+            // help and version come this way too; a closed pipe is not our problem
+            let _ = e.print();
+            return ExitCode::from(u8::try_from(e.exit_code()).unwrap_or(2));
+        }
+    };
+    let result = match &cli.command {
+        Command::Run(args) => run::run(args),
+        Command::Info(args) => info::info(args),
+        Command::Check(args) => info::check(args),
+        Command::Schema { json } => {
+            if *json {
+                out(&format!("{:#}\n", toile::scene::schema::json_schema()))
+            } else {
+                out(&toile::scene::schema::text())
+            }
+        }
+        Command::Mannequin { out, cell } => info::mannequin(out, *cell),
+    };
+    match result {
+        Ok(code) => code,
+        Err(Failure { code, text }) => {
+            output::err(&format!("toile: error: {text}\n"));
+            ExitCode::from(code)
+        }
+    }
+}

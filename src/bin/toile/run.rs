@@ -1,0 +1,206 @@
+//! `toile run`: builds, drapes, steps, writes.
+
+use crate::args::RunArgs;
+use crate::info::load;
+use crate::output::{Done, Failure, file, not_written, out};
+use crate::summary::{Summary, table};
+use indicatif::{ProgressBar, ProgressStyle};
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::Instant;
+use toile::error::Error;
+use toile::math::Vec3;
+use toile::readout::export::{gltf, obj, pc2};
+use toile::readout::picture::{PictureOptions, render};
+use toile::readout::{Part, crossings, surface};
+use toile::scene::Scene;
+use toile::sim::{DrapeOptions, Outcome, Progress, Sim, StepReport};
+use toile::sim_scene::{Driver, build};
+
+/// Time of `--verify` [s] and its step [s].
+const VERIFY: (u32, f64) = (60, 1.0 / 60.0);
+
+/// Garment frames kept for the model file and the point cache.
+#[derive(Default)]
+struct Frames {
+    times: Vec<f64>,
+    positions: Vec<Vec<Vec3>>,
+}
+
+impl Frames {
+    fn keep(&mut self, sim: &Sim) {
+        self.times.push(sim.time());
+        self.positions.push(sim.positions().to_vec());
+    }
+}
+
+pub(crate) fn run(args: &RunArgs) -> Done {
+    std::fs::create_dir_all(&args.out).map_err(|e| Failure {
+        code: 4,
+        text: format!("cannot make {}: {e}", args.out.display()),
+    })?;
+    let start = Instant::now();
+    let scene = load(&args.scene)?;
+    let mut sim = build(&scene)?;
+    let mut summary = Summary::new(&scene);
+    let bar = bar(args.quiet);
+    let mut driver = Driver::new(&sim, &scene)?;
+    let mut last = None;
+    if scene.run.drape {
+        last = Some(drape(&mut sim, &bar)?);
+        summary.outcome = last.as_ref().map(|r| r.outcome);
+    }
+    summary.add(last.as_ref());
+    let mut frames = Frames::default();
+    let steps = scene.run.steps();
+    let every = u64::from(scene.run.frame_every);
+    if every > 0 && steps > 0 {
+        frames.keep(&sim);
+    }
+    let origin = sim.time();
+    bar.set_message("step");
+    for step in 1..=steps {
+        driver.set(&mut sim, &scene, origin + step as f64 * scene.run.dt)?;
+        let report = sim.step(scene.run.dt)?;
+        summary.worst(report.outcome);
+        summary.add(Some(&report));
+        summary.steps += 1;
+        last = Some(report);
+        if every > 0 && step % every == 0 {
+            frames.keep(&sim);
+        }
+        bar.set_position((step as f64 / steps as f64 * 1000.0) as u64);
+    }
+    bar.finish_and_clear();
+    let last = match last {
+        Some(report) => report,
+        None => sim.report()?,
+    };
+    summary.wall_seconds = start.elapsed().as_secs_f64();
+    summary.simulated_seconds = sim.time() - origin;
+    summary.measure_memory();
+    write(&args.out, &scene, &sim, &frames, &mut summary)?;
+    if args.verify {
+        summary.further_second_motion = Some(further_second(&mut sim)?);
+    }
+    let json = summary.to_json(&sim, &last);
+    let text = format!("{json:#}\n");
+    file(&args.out.join("summary.json"), text.as_bytes())?;
+    if !args.quiet {
+        out(&table(&scene, &json, &args.out))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// A bar on the terminal; nothing where there is none.
+fn bar(quiet: bool) -> ProgressBar {
+    if quiet {
+        return ProgressBar::hidden();
+    }
+    let bar = ProgressBar::new(1000);
+    if let Ok(style) =
+        ProgressStyle::with_template("{msg:>7} {bar:36} {percent:>3} %  {elapsed} gone, {eta} left")
+    {
+        bar.set_style(style);
+    }
+    bar
+}
+
+fn drape(sim: &mut Sim, bar: &ProgressBar) -> Result<StepReport, Error> {
+    let options = DrapeOptions {
+        force_tolerance: 0.0,
+        max_steps: 0,
+    };
+    let report = sim.drape(&options, &mut |p: &Progress| {
+        bar.set_message(p.stage);
+        bar.set_position((p.fraction.clamp(0.0, 1.0) * 1000.0) as u64);
+        true
+    })?;
+    bar.reset();
+    Ok(report)
+}
+
+/// Largest distance of any vertex from where it is now, over one simulated second with bodies and
+/// pins standing still [m].
+fn further_second(sim: &mut Sim) -> Result<f64, Error> {
+    let start = sim.positions().to_vec();
+    let mut largest = 0.0_f64;
+    for _ in 0..VERIFY.0 {
+        sim.step(VERIFY.1)?;
+        for (x, x0) in sim.positions().iter().zip(&start) {
+            largest = largest.max((x - x0).norm());
+        }
+    }
+    Ok(largest)
+}
+
+/// Model files, picture, pattern, state; counts of what crosses bodies go into the summary.
+fn write(
+    dir: &Path,
+    scene: &Scene,
+    sim: &Sim,
+    frames: &Frames,
+    summary: &mut Summary,
+) -> Result<(), Failure> {
+    let names: Vec<&str> = scene
+        .garment
+        .panels
+        .iter()
+        .map(|p| p.name.as_str())
+        .collect();
+    let (x, triangles) = (sim.positions(), sim.triangles());
+    let text = obj::to_obj(x, triangles, sim.vertex_uv(), sim.vertex_panels(), &names);
+    file(&dir.join("garment.obj"), text.as_bytes())?;
+    let mut parts = vec![Part::garment("garment", x, triangles, sim.vertex_panels())];
+    let edges = surface::edges(triangles);
+    for (i, body) in (0_u32..).zip(&scene.bodies) {
+        let (positions, faces) = sim.body_mesh(i)?;
+        summary.body_crossings += crossings::crossing_edges(x, &edges, &positions, &faces).len();
+        parts.push(Part::body(&body.name, positions, faces));
+    }
+    let animation = (!frames.times.is_empty()).then_some(gltf::Animation {
+        part: 0,
+        times: &frames.times,
+        frames: &frames.positions,
+    });
+    let glb = gltf::to_glb(&parts, animation.as_ref())?;
+    file(&dir.join("scene.glb"), &glb)?;
+    if !frames.times.is_empty() {
+        file(&dir.join("garment.pc2"), &pc2::to_pc2(&frames.positions)?)?;
+    }
+    let up = -Vec3::from(scene.gravity);
+    let options = PictureOptions {
+        // up is against gravity; without gravity it is y
+        up: up.try_normalize(1e-9).unwrap_or_else(Vec3::y),
+        ..PictureOptions::default()
+    };
+    let options = if options.up.cross(&options.front).norm() < 1e-3 {
+        PictureOptions {
+            front: -Vec3::y(),
+            ..options
+        }
+    } else {
+        options
+    };
+    render(&parts, &options)?
+        .write_png(&dir.join("picture.png"))
+        .map_err(not_written)?;
+    let svg = toile::pattern::export::to_svg(&scene.garment, 0.01);
+    file(&dir.join("pattern.svg"), svg.as_bytes())?;
+    file(&dir.join("state.bin"), &sim.save()?)
+}
+
+impl Summary {
+    /// Keeps the outcome that matters most: a limit that was hit outweighs substeps.
+    fn worst(&mut self, outcome: Outcome) {
+        let rank = |o: Outcome| match o {
+            Outcome::Converged => 0,
+            Outcome::Substepped => 1,
+            Outcome::IterationLimit => 2,
+            Outcome::Cancelled => 3,
+        };
+        if self.outcome.is_none_or(|o| rank(o) < rank(outcome)) {
+            self.outcome = Some(outcome);
+        }
+    }
+}

@@ -1,0 +1,63 @@
+//! Pins of a scene file.
+
+use super::offset_keys;
+use crate::error::Result;
+use crate::pattern::Garment;
+use crate::pattern::import::read::Node;
+use crate::scene::{PinPlace, ScenePin, schema};
+
+/// Reads a pin; panel and edge are looked up where the garment is known.
+pub(super) fn pin(node: &Node<'_>, garment: Option<&Garment>) -> Result<ScenePin> {
+    let object = node.object()?;
+    object.only(schema::PIN)?;
+    let panel_node = object.need("panel")?;
+    let panel = match (panel_node.value.as_str(), garment) {
+        (Some(_), None) => 0,
+        (Some(name), Some(garment)) => garment
+            .panels
+            .iter()
+            .position(|p| p.name == name)
+            .and_then(|i| u32::try_from(i).ok())
+            .ok_or_else(|| panel_node.error(format!("no panel is named {name:?}")))?,
+        (None, _) => panel_node.index()?,
+    };
+    let edges = garment.map(|g| (g.panels.len(), g.panels.get(panel as usize)));
+    let edges = match edges {
+        None => None,
+        Some((_, Some(p))) => Some(p.edge_count()),
+        Some((count, None)) => return Err(panel_node.error(format!("panel {panel} of {count}"))),
+    };
+    let place = match (object.get("uv"), object.get("edge")) {
+        (Some(uv), None) => PinPlace::Point(uv.vec2()?.into()),
+        (None, Some(edge)) => {
+            let index = edge.index()?;
+            if let Some(count) = edges
+                && index as usize >= count
+            {
+                return Err(edge.error(format!("edge {index} of {count}")));
+            }
+            PinPlace::Edge(index)
+        }
+        _ => return Err(object.error("give either uv or edge")),
+    };
+    let target = match object.get("target") {
+        None => None,
+        Some(target) if matches!(place, PinPlace::Edge(_)) => {
+            return Err(target.error("an edge has no single target; use motion"));
+        }
+        Some(target) => Some(target.vec3()?.into()),
+    };
+    Ok(ScenePin {
+        panel,
+        place,
+        target,
+        motion: match object.get("motion") {
+            Some(n) => offset_keys(&n)?,
+            None => Vec::new(),
+        },
+        until: match object.get("until") {
+            Some(n) => Some(n.number()?),
+            None => None,
+        },
+    })
+}

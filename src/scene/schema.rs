@@ -1,0 +1,619 @@
+//! Every key of a scene file: type, unit, default, meaning.
+//!
+//! The reader refuses keys that are not in these tables, so the tables cannot miss one; a test
+//! checks that they hold none that the reader does not read. Tables of the garment and of fabrics
+//! stand with their readers.
+
+use crate::pattern::import::schema::{self as pattern, Key};
+use crate::solve::settings::Settings;
+use serde_json::{Map, Value, json};
+use std::fmt::Write;
+
+/// Version of the format that this library reads.
+pub const VERSION: u32 = 1;
+
+const fn key(
+    name: &'static str,
+    kind: &'static str,
+    unit: &'static str,
+    default: &'static str,
+    doc: &'static str,
+) -> Key {
+    Key {
+        name,
+        kind,
+        unit,
+        default,
+        doc,
+    }
+}
+
+/// Keys of the scene itself.
+pub const SCENE: &[Key] = &[
+    key(
+        "toile",
+        "integer",
+        "",
+        "required",
+        "version of the format, 1",
+    ),
+    key("name", "text", "", "the garment's", "name for people"),
+    key("about", "text", "", "none", "free text, not read"),
+    key(
+        "garment",
+        "object",
+        "",
+        "required",
+        "a garment object, a GarmentCode specification, or {\"file\": path} of one",
+    ),
+    key(
+        "edge_length",
+        "number",
+        "m",
+        "the garment's",
+        "target edge length of every panel",
+    ),
+    key(
+        "fabrics",
+        "object",
+        "",
+        "the garment's",
+        "fabric by panel name, \"*\" for all others: a fabric object, an ARCSim material, or {\"file\": path} of one",
+    ),
+    key("bodies", "array", "", "none", "bodies of the world"),
+    key(
+        "gravity",
+        "[x, y, z]",
+        "m/s^2",
+        "[0, -9.81, 0]",
+        "acceleration of gravity",
+    ),
+    key(
+        "wind",
+        "[x, y, z]",
+        "m/s",
+        "[0, 0, 0]",
+        "velocity of the air",
+    ),
+    key(
+        "pressure",
+        "number",
+        "Pa",
+        "0",
+        "pressure along the cloth's normal",
+    ),
+    key("pins", "array", "", "none", "held points and edges"),
+    key(
+        "numbers",
+        "object",
+        "",
+        "{}",
+        "tunables by dotted name; they are listed at the end",
+    ),
+    key(
+        "initial",
+        "object",
+        "",
+        "the placed panels",
+        "state to start from",
+    ),
+    key("run", "object", "", "drape only", "what to run"),
+];
+
+/// Keys of a file reference.
+pub const FILE: &[Key] = &[key(
+    "file",
+    "text",
+    "",
+    "required",
+    "path relative to the scene's folder",
+)];
+
+/// Keys of a body.
+pub const BODY: &[Key] = &[
+    key(
+        "name",
+        "text",
+        "",
+        "body and its number",
+        "name for people and model files",
+    ),
+    key(
+        "shape",
+        "text",
+        "",
+        "required",
+        "\"sphere\", \"capsule\", \"plane\", \"grid\", \"mesh\" or \"mannequin\"",
+    ),
+    key(
+        "file",
+        "text",
+        "",
+        "required",
+        "mesh: closed OBJ mesh, path relative to the scene's folder",
+    ),
+    key(
+        "scale",
+        "number",
+        "",
+        "1",
+        "mesh: factor from the file's coordinates to metres, also for motion.frames",
+    ),
+    key(
+        "cell_size",
+        "number",
+        "m",
+        "chosen",
+        "mesh and mannequin: cell of the distance field, 0 chooses; grid: required",
+    ),
+    key("radius", "number", "m", "required", "sphere and capsule"),
+    key(
+        "half_length",
+        "number",
+        "m",
+        "required",
+        "capsule: along y from -half_length to half_length",
+    ),
+    key(
+        "normal",
+        "[x, y, z]",
+        "",
+        "[0, 1, 0]",
+        "plane: points out of the body",
+    ),
+    key(
+        "offset",
+        "number",
+        "m",
+        "0",
+        "plane: the body is where normal . x <= offset",
+    ),
+    key(
+        "counts",
+        "[integer, integer, integer]",
+        "",
+        "required",
+        "grid: nodes along x, y, z",
+    ),
+    key(
+        "origin",
+        "[x, y, z]",
+        "m",
+        "[0, 0, 0]",
+        "grid: position of the first node",
+    ),
+    key(
+        "values",
+        "array of numbers",
+        "m",
+        "required",
+        "grid: signed distances, z fastest",
+    ),
+    key("pose", "object", "", "identity", "where it stands"),
+    key("contact", "object", "", "see there", "how cloth meets it"),
+    key("motion", "object", "", "none", "how it moves"),
+];
+
+/// Keys of a body that every shape has.
+pub const BODY_COMMON: &[&str] = &["name", "shape", "pose", "contact", "motion"];
+
+/// Keys of a pose.
+pub const POSE: &[Key] = &[
+    key(
+        "position",
+        "[x, y, z]",
+        "m",
+        "[0, 0, 0]",
+        "world position of the body's origin",
+    ),
+    key(
+        "quaternion_xyzw",
+        "[x, y, z, w]",
+        "",
+        "[0, 0, 0, 1]",
+        "rotation from body to world",
+    ),
+    key(
+        "rotation_deg",
+        "[x, y, z]",
+        "degree",
+        "[0, 0, 0]",
+        "instead: turns about x, then y, then z of the world, R = Rz Ry Rx",
+    ),
+];
+
+/// Keys of a body's contact.
+pub const CONTACT: &[Key] = &[
+    key("friction", "number", "", "0.3", "Coulomb friction"),
+    key(
+        "thickness",
+        "number",
+        "m",
+        "0.003",
+        "gap kept free between the body and the cloth's middle surface",
+    ),
+    key(
+        "stiffness",
+        "number",
+        "Pa/m",
+        "1e7",
+        "penalty, pressure per depth",
+    ),
+];
+
+/// Keys of a body's motion.
+pub const MOTION: &[Key] = &[
+    key(
+        "keyframes",
+        "array",
+        "",
+        "none",
+        "poses over time, instead of pose",
+    ),
+    key(
+        "frames",
+        "array of text",
+        "",
+        "none",
+        "mesh: OBJ files with the mesh's vertices, one for each frame",
+    ),
+    key(
+        "rate",
+        "number",
+        "1/s",
+        "required with frames",
+        "frames per second",
+    ),
+    key(
+        "repeat",
+        "boolean",
+        "",
+        "false",
+        "start over after the last frame",
+    ),
+];
+
+/// Keys of a keyframe of a body.
+pub const KEYFRAME: &[Key] = &[
+    key("time", "number", "s", "required", "times increase"),
+    key("position", "[x, y, z]", "m", "[0, 0, 0]", "as in pose"),
+    key(
+        "quaternion_xyzw",
+        "[x, y, z, w]",
+        "",
+        "[0, 0, 0, 1]",
+        "as in pose",
+    ),
+    key(
+        "rotation_deg",
+        "[x, y, z]",
+        "degree",
+        "[0, 0, 0]",
+        "as in pose",
+    ),
+];
+
+/// Keys of a pin.
+pub const PIN: &[Key] = &[
+    key(
+        "panel",
+        "text or integer",
+        "",
+        "required",
+        "panel by name or index",
+    ),
+    key(
+        "uv",
+        "[u, v]",
+        "m",
+        "this or edge",
+        "flat point; the nearest vertex is held",
+    ),
+    key(
+        "edge",
+        "integer",
+        "",
+        "this or uv",
+        "edge number; every vertex on it is held",
+    ),
+    key(
+        "target",
+        "[x, y, z]",
+        "m",
+        "where placed",
+        "with uv: where the point is to be",
+    ),
+    key("motion", "array", "", "none", "displacements over time"),
+    key(
+        "until",
+        "number",
+        "s",
+        "never",
+        "time at which the pin lets go",
+    ),
+];
+
+/// Keys of a keyframe of a pin.
+pub const OFFSET: &[Key] = &[
+    key("time", "number", "s", "required", "times increase"),
+    key(
+        "offset",
+        "[x, y, z]",
+        "m",
+        "required",
+        "displacement from the pin's place",
+    ),
+];
+
+/// Keys of the initial state.
+pub const INITIAL: &[Key] = &[
+    key(
+        "file",
+        "text",
+        "",
+        "none",
+        "OBJ file with a position for each vertex, as `toile run` writes it",
+    ),
+    key(
+        "velocity",
+        "[x, y, z]",
+        "m/s",
+        "[0, 0, 0]",
+        "velocity of every vertex",
+    ),
+    key(
+        "snapshot",
+        "text",
+        "",
+        "none",
+        "saved state of the same scene, instead of the others",
+    ),
+];
+
+/// Keys of the run.
+pub const RUN: &[Key] = &[
+    key(
+        "drape",
+        "boolean",
+        "",
+        "true",
+        "sew and drape to rest first",
+    ),
+    key("duration", "number", "s", "0", "time simulated afterwards"),
+    key("dt", "number", "s", "1/60", "step of that time"),
+    key(
+        "frame_every",
+        "integer",
+        "",
+        "0",
+        "keep a frame every so many steps; 0 keeps none",
+    ),
+];
+
+/// The scene's own tables with the path of the object each belongs to, "" for the scene.
+pub const TABLES: &[(&str, &[Key])] = &[
+    ("", SCENE),
+    ("fabrics.<panel>", FILE),
+    ("bodies[]", BODY),
+    ("bodies[].pose", POSE),
+    ("bodies[].contact", CONTACT),
+    ("bodies[].motion", MOTION),
+    ("bodies[].motion.keyframes[]", KEYFRAME),
+    ("pins[]", PIN),
+    ("pins[].motion[]", OFFSET),
+    ("initial", INITIAL),
+    ("run", RUN),
+];
+
+/// Tables of the scene, then those of the garment.
+pub fn tables() -> impl Iterator<Item = (&'static str, &'static [Key])> {
+    TABLES
+        .iter()
+        .copied()
+        .chain([("garment (a file)", FILE)])
+        .chain(pattern::TABLES.iter().copied())
+}
+
+/// The schema as text for people.
+pub fn text() -> String {
+    let mut out = String::new();
+    let _ = writeln!(
+        out,
+        "Scene files of toile {}, format version {VERSION}. SI units. Keys that are not listed are refused.",
+        env!("CARGO_PKG_VERSION")
+    );
+    for (path, keys) in tables() {
+        let _ = writeln!(out, "\n{}", if path.is_empty() { "scene" } else { path });
+        for k in keys {
+            let unit = if k.unit.is_empty() {
+                String::new()
+            } else {
+                format!(" [{}]", k.unit)
+            };
+            let _ = writeln!(
+                out,
+                "  {:<18} {}{unit}, default: {}",
+                k.name, k.kind, k.default
+            );
+            let _ = writeln!(out, "  {:<18}   {}", "", k.doc);
+        }
+    }
+    let _ = writeln!(
+        out,
+        "\nnumbers (and the names of `--set` and of the C ABI's set_number)"
+    );
+    for k in Settings::KEYS {
+        let unit = if k.unit == "1" {
+            String::new()
+        } else {
+            format!(" [{}]", k.unit)
+        };
+        let _ = writeln!(
+            out,
+            "  {}\n      number{unit}, default: {}, from {} to {}\n      {}",
+            k.name,
+            k.default,
+            k.min,
+            k.max,
+            k.doc.trim()
+        );
+    }
+    out
+}
+
+/// JSON Schema (draft 2020-12) type of a key.
+fn json_type(kind: &str) -> Value {
+    let vector = |n: usize, item: &str| json!({"type": "array", "items": {"type": item}, "minItems": n, "maxItems": n});
+    match kind {
+        "integer" => json!({"type": "integer"}),
+        "number" => json!({"type": "number"}),
+        "text" => json!({"type": "string"}),
+        "boolean" => json!({"type": "boolean"}),
+        "object" => json!({"type": "object"}),
+        "text or integer" => json!({"type": ["string", "integer"]}),
+        "[u, v]" => vector(2, "number"),
+        "[x, y, z]" => vector(3, "number"),
+        "[x, y, z, w]" => vector(4, "number"),
+        "[integer, integer]" => vector(2, "integer"),
+        "[integer, integer, integer]" => vector(3, "integer"),
+        "array of text" => json!({"type": "array", "items": {"type": "string"}}),
+        "array of numbers" => json!({"type": "array", "items": {"type": "number"}}),
+        _ => json!({"type": "array"}),
+    }
+}
+
+fn object_schema(path: &str, keys: &[Key]) -> Value {
+    let mut properties = Map::new();
+    let mut required = Vec::new();
+    for k in keys {
+        let child = if path.is_empty() {
+            k.name.to_owned()
+        } else {
+            format!("{path}.{}", k.name)
+        };
+        let mut schema = nested(&child, k);
+        if let Some(map) = schema.as_object_mut() {
+            let unit = if k.unit.is_empty() {
+                String::new()
+            } else {
+                format!(" [{}]", k.unit)
+            };
+            map.insert(
+                "description".into(),
+                json!(format!("{}{unit}; default: {}", k.doc, k.default)),
+            );
+        }
+        // shapes of a body need different keys: only what all of them need is required here
+        if k.default == "required" && !(path == "bodies[]" && k.name != "shape") {
+            required.push(json!(k.name));
+        }
+        properties.insert(k.name.into(), schema);
+    }
+    json!({
+        "type": "object",
+        "properties": properties,
+        "required": required,
+        "additionalProperties": false,
+    })
+}
+
+/// The schema of a key's value, with the table of its object where there is one.
+fn nested(path: &str, k: &Key) -> Value {
+    let find = |wanted: &str| tables().find(|(p, _)| *p == wanted);
+    if path == "numbers" {
+        let numbers: Map<String, Value> = Settings::KEYS
+            .iter()
+            .map(|k| {
+                let value = json!({
+                    "type": "number", "minimum": k.min, "maximum": k.max,
+                    "default": k.default,
+                    "description": format!("{} [{}]", k.doc.trim(), k.unit),
+                });
+                (k.name.to_owned(), value)
+            })
+            .collect();
+        return json!({"type": "object", "properties": numbers, "additionalProperties": false});
+    }
+    if path == "garment" {
+        let own = find("garment").map_or(json!({}), |(p, keys)| object_schema(p, keys));
+        let file = object_schema("garment (a file)", FILE);
+        let code = json!({"type": "object", "required": ["pattern"]});
+        return json!({"anyOf": [own, file, code]});
+    }
+    if path == "fabrics" {
+        return json!({"type": "object", "additionalProperties": {"type": "object"}});
+    }
+    if let Some((p, keys)) = find(path) {
+        return object_schema(p, keys);
+    }
+    if let Some((p, keys)) = find(&format!("{path}[]")) {
+        let item = object_schema(p, keys);
+        // edges may be pairs, fabrics may be paths
+        let item = match k.name {
+            "edges" => json!({"anyOf": [item, {"type": "array"}]}),
+            "fabrics" => json!({"anyOf": [item, {"type": "string"}]}),
+            _ => item,
+        };
+        return json!({"type": "array", "items": item});
+    }
+    json_type(k.kind)
+}
+
+/// The schema as a JSON Schema document (draft 2020-12).
+pub fn json_schema() -> Value {
+    let mut schema = object_schema("", SCENE);
+    if let Some(map) = schema.as_object_mut() {
+        map.insert(
+            "$schema".into(),
+            json!("https://json-schema.org/draft/2020-12/schema"),
+        );
+        map.insert("title".into(), json!("toile scene"));
+    }
+    schema
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_key_stands_twice_and_each_has_a_meaning() {
+        for (path, keys) in tables() {
+            for (i, k) in keys.iter().enumerate() {
+                assert!(
+                    !k.doc.is_empty() && !k.default.is_empty(),
+                    "{path}.{}",
+                    k.name
+                );
+                assert!(
+                    keys[..i].iter().all(|o| o.name != k.name),
+                    "{path}.{}",
+                    k.name
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn text_and_json_schema_name_every_key() {
+        let (text, json) = (text(), json_schema().to_string());
+        for (path, keys) in tables() {
+            for k in keys {
+                assert!(
+                    text.contains(k.name) && text.contains(k.doc),
+                    "{path}.{}",
+                    k.name
+                );
+                // a fabric in `fabrics` may be of two formats: left open in the JSON Schema
+                assert!(
+                    json.contains(&format!("\"{}\"", k.name)),
+                    "{path}.{}",
+                    k.name
+                );
+            }
+        }
+        for k in Settings::KEYS {
+            assert!(text.contains(k.name) && json.contains(k.name), "{}", k.name);
+        }
+    }
+}
