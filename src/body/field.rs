@@ -26,7 +26,7 @@ use crate::math::parallel::Workers;
 /// Largest memory of a field while it is built [bytes].
 const MAX_BYTES: f64 = 1e9;
 /// Distance from a stored brick's centre to the surface, in spacings.
-const BAND: f64 = 7.2;
+const BAND: f64 = 6.2;
 /// Half diagonal of a brick's nodes, in spacings: 1.5 sqrt(3), rounded up.
 const RADIUS: f64 = 2.6;
 /// A level with at most this many bricks in its box is the top and stored whole.

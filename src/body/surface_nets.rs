@@ -3,8 +3,10 @@
 //!
 //! The vertex is the mean of the cell's cut edges and is then drawn onto the surface by a few
 //! Newton steps along the gradient, never farther than half a cell. The mesh is closed where the
-//! surface stays inside the box; it is a manifold where no cell is passed twice (cell well below
-//! the smallest thickness and gap).
+//! surface stays inside the box, and always a manifold: a cell through which two sheets pass (its
+//! corners inside, or those outside, do not hang together along its edges) would join them in one
+//! vertex, so its outside corner nearest to the surface is first moved inside. That only adds to the
+//! inside and therefore ends; it bridges gaps thinner than a cell.
 
 use crate::math::Vec3;
 
@@ -29,6 +31,7 @@ pub(super) fn surface_nets(
             }
         }
     }
+    merge_sheets(&mut values, n);
     let mut vertices = Vec::new();
     let mut number = vec![u32::MAX; values.len()];
     for x in 0..n[0] - 1 {
@@ -96,6 +99,56 @@ pub(super) fn surface_nets(
         }
     }
     (vertices, triangles)
+}
+
+/// Whether the corners inside and the corners outside of a cell each hang together.
+fn single_sheet(mask: u8) -> bool {
+    let connected = |set: u8| {
+        let mut reached = set & set.wrapping_neg();
+        loop {
+            let mut next = reached;
+            for c in (0..8).filter(|c| reached >> c & 1 == 1) {
+                next |= (1 << (c ^ 1) | 1 << (c ^ 2) | 1 << (c ^ 4)) & set;
+            }
+            if next == reached {
+                return reached == set;
+            }
+            reached = next;
+        }
+    };
+    connected(mask) && connected(!mask)
+}
+
+fn merge_sheets(values: &mut [f64], n: [usize; 3]) {
+    let good: Vec<bool> = (0..=255).map(single_sheet).collect();
+    let strides = [n[1] * n[2], n[2], 1];
+    let offsets: [usize; 8] =
+        std::array::from_fn(|c| (c >> 2) * strides[0] + (c >> 1 & 1) * strides[1] + (c & 1));
+    let mut again = true;
+    while again {
+        again = false;
+        for x in 0..n[0] - 1 {
+            for y in 0..n[1] - 1 {
+                for z in 0..n[2] - 1 {
+                    let base = x * strides[0] + y * strides[1] + z;
+                    let mask = (0..8).fold(0, |m, c| {
+                        m | usize::from(values[base + offsets[c]] < 0.0) << c
+                    });
+                    if good[mask] {
+                        continue;
+                    }
+                    let outside = offsets
+                        .iter()
+                        .map(|o| base + o)
+                        .filter(|&i| values[i] >= 0.0);
+                    if let Some(i) = outside.min_by(|&i, &j| values[i].total_cmp(&values[j])) {
+                        values[i] = -values[i].max(1e-12);
+                        again = true;
+                    }
+                }
+            }
+        }
+    }
 }
 
 fn project(f: &dyn Fn(&Vec3) -> f64, start: Vec3, cell: f64) -> Vec3 {
