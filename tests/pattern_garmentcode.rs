@@ -18,7 +18,7 @@ fn find(data: &Path, file: &str) -> Garment {
         .unwrap_or_else(|| panic!("{file} is not in {}", data.display()));
     let (garment, notes) = garment_from_file(&path).unwrap();
     assert!(notes.is_empty());
-    garment.check(10_000_000).unwrap();
+    garment.check().unwrap();
     garment
 }
 

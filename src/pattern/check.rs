@@ -26,9 +26,14 @@ pub const DEFAULT_MAX_VERTICES: usize = 2_000_000;
 const TURN: f64 = std::f64::consts::PI / 16.0;
 
 impl Garment {
-    /// Checks everything but the size of the triangulation, then that its estimated vertex count is
-    /// at most `max_vertices`.
-    pub fn check(&self, max_vertices: usize) -> Result<()> {
+    /// [`Garment::check_within`] of [`DEFAULT_MAX_VERTICES`].
+    pub fn check(&self) -> Result<()> {
+        self.check_within(DEFAULT_MAX_VERTICES)
+    }
+
+    /// [`Garment::check_geometry`], and that the estimated vertex count of the triangulation is at
+    /// most `max_vertices`.
+    pub fn check_within(&self, max_vertices: usize) -> Result<()> {
         self.check_geometry()?;
         let estimate = self.estimated_vertices(1.0)?;
         if estimate > max_vertices as f64 {

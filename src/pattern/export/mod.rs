@@ -1,5 +1,8 @@
 //! Flat patterns to files: toile's own JSON, SVG.
 
 pub mod json;
+pub mod offset;
+pub mod svg;
 
 pub use json::{fabric_to_json, garment_to_json};
+pub use svg::to_svg;
