@@ -209,7 +209,7 @@ pub fn dihedral_gradient(x: &[Vec3; 4], floor: HingeFloor) -> [Vec3; 4] {
 ///
 /// With `g_k = |e| n_k / |n_k|^2` the derivative by the edge vector is `-(s_2 g_2 + s_3 g_3)`; the
 /// blocks are the derivatives of these closed forms (the result agrees with Tamstorf and Grinspun
-/// 2013, section 5). Symmetric only outside the floor.
+/// 2013, section 5). Made symmetric, which changes it only inside the floor.
 pub fn dihedral_hessian(x: &[Vec3; 4], floor: HingeFloor) -> [[Mat3; 4]; 4] {
     let f = hinge_frame(x, floor);
     // derivatives of the normals by the edge vector and by the opposite vertex
@@ -227,9 +227,10 @@ pub fn dihedral_hessian(x: &[Vec3; 4], floor: HingeFloor) -> [[Mat3; 4]; 4] {
         ee -= f.g[k] * ds_de.transpose() + ge[k] * f.s[k];
     }
     let mut h = [[Mat3::zeros(); 4]; 4];
-    h[1][1] = ee;
+    let symmetric = |m: Mat3| (m + m.transpose()) * 0.5;
+    h[1][1] = symmetric(ee);
     for k in 0..2 {
-        h[k + 2][k + 2] = gu[k];
+        h[k + 2][k + 2] = symmetric(gu[k]);
         h[k + 2][1] = ge[k];
         h[1][k + 2] = ge[k].transpose();
     }
@@ -238,7 +239,7 @@ pub fn dihedral_hessian(x: &[Vec3; 4], floor: HingeFloor) -> [[Mat3; 4]; 4] {
         h[0][j] = -(h[1][j] + h[2][j] + h[3][j]);
         h[j][0] = h[0][j].transpose();
     }
-    h[0][0] = -(h[1][0] + h[2][0] + h[3][0]);
+    h[0][0] = symmetric(-(h[1][0] + h[2][0] + h[3][0]));
     h
 }
 
