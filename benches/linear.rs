@@ -1,6 +1,6 @@
 //! Time to solve one Newton system of sewn cloth: sizes x step sizes x solvers. One thread,
 //! thread CPU is not separated from wall time, so run it on a quiet machine.
-//! `cargo bench --bench linear [-- LARGEST_N]`.
+//! `cargo bench --bench linear [-- LARGEST_N [SMALLEST_N]]`.
 
 #[path = "../tests/linear_cases/mod.rs"]
 mod cases;
@@ -14,10 +14,9 @@ use toile::solve::linear::jacobi::BlockJacobi;
 use toile::solve::linear::pcg::ConjugateGradients;
 
 fn main() {
-    let largest: usize = std::env::args()
-        .skip(1)
-        .find_map(|a| a.parse().ok())
-        .unwrap_or(30_000);
+    let sizes: Vec<usize> = std::env::args().filter_map(|a| a.parse().ok()).collect();
+    let largest = sizes.first().copied().unwrap_or(30_000);
+    let smallest = sizes.get(1).copied().unwrap_or(0);
     println!(
         "relative residual 1e-6; times in ms, best of repeats; analysis = first prepare - later prepare"
     );
@@ -25,7 +24,10 @@ fn main() {
         "{:>7} {:>5} {:<22} {:>9} {:>9} {:>9} {:>9} {:>6} {:>9} {:>9}",
         "n", "h ms", "solver", "analysis", "factor", "solve", "sum", "its", "residual", "MB"
     );
-    for n in [400, 1_600, 4_900, 10_000, 30_000, 90_000] {
+    for n in [400, 1_600, 4_900, 10_000, 30_000, 90_000]
+        .into_iter()
+        .filter(|n| *n >= smallest)
+    {
         if n > largest {
             break;
         }

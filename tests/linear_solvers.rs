@@ -1,5 +1,7 @@
 //! Laws of the linear solvers.
 
+#![allow(clippy::expect_used, reason = "test code")]
+
 mod linear_cases;
 
 use linear_cases::{Random, add, forces, residual, sewn_cloth};
@@ -281,9 +283,9 @@ fn cuthill_mckee_is_a_permutation_of_small_bandwidth() {
 /// Numbers in the settings choose what they say; the automatic choice follows size and stiffness.
 #[test]
 fn the_choice_follows_its_number() {
-    assert_eq!(solver(1, None).name(), "cholesky");
-    assert_eq!(solver(2, None).name(), "cg_jacobi");
-    assert_eq!(solver(3, Some(&[0; 10])).name(), "cg_ic0");
+    assert_eq!(solver(1, 2_000, None).name(), "cholesky");
+    assert_eq!(solver(2, 2_000, None).name(), "cg_jacobi");
+    assert_eq!(solver(3, 2_000, Some(&[0; 10])).name(), "cg_ic0");
     for (n, h, expected) in [
         (1_600, 1e-2, "cholesky"),
         (4_900, 1e-3, "cg_ic0"),
@@ -292,7 +294,7 @@ fn the_choice_follows_its_number() {
         let case = sewn_cloth(n, 4, h);
         let b = forces(case.matrix.n(), 1);
         let mut x = vec![Vec3::zeros(); b.len()];
-        let mut automatic = solver(0, Some(&case.priorities));
+        let mut automatic = solver(0, 2_000, Some(&case.priorities));
         automatic.prepare(&case.matrix).expect("prepares");
         assert_eq!(automatic.name(), expected, "{n} vertices, step {h}");
         automatic

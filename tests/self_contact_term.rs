@@ -1,5 +1,7 @@
 //! Laws of the contact of cloth with itself.
 
+#![allow(clippy::expect_used, reason = "test code")]
+
 mod self_contact_cases;
 
 use self_contact_cases::{Random, at, sew, squares, state};

@@ -1,11 +1,18 @@
 //! Which linear solver.
 //!
 //! The crossover was measured by `benches/linear.rs` on sewn cloth (time to a relative residual of
-//! 1e-6, one core of an AMD Zen 3). With `n` vertices, Cholesky takes about
-//! `0.135 s (n / 10^4)^1.6`; an iteration with IC(0) takes `0.12 us n`, and it needs about
-//! `2.9 sqrt(rho)` of them, where `rho` is the stiffness of a vertex over its mass by the squared
-//! step. So iterating wins by a fair margin when
-//! `rho < 900 (n / 10^4)^1.2`: at 10^4 vertices of a light shirt up to steps of 3 ms.
+//! 1e-6 without the symbolic analysis, one core of an AMD Zen 3). With `rho` the stiffness of a
+//! vertex over its mass by the squared step, IC(0) against Cholesky takes
+//!
+//! | vertices | rho, ms against ms | | |
+//! |---|---|---|---|
+//! | 1 600 | 16: 2.3, 5.4 | 140: 6.6, 5.6 | 1 600: 13, 10 |
+//! | 4 800 | 50: 11, 36 | 430: 28, 44 | 4 800: 55, 43 |
+//! | 10 000 | 100: 41, 134 | 900: 97, 148 | 10 000: 286, 149 |
+//! | 30 000 | 300: 284, 817 | 2 700: 2 060, 813 | 30 000: 4 100, 691 |
+//!
+//! so that iterating wins by a fair margin where `rho < 700 min(1, (n / 5000)^1.7)`: for a shirt of
+//! 10^4 vertices, up to steps of about 3 ms.
 //!
 //! `rho` is read off the matrix: internal stiffness has zero row sums, so what a row's blocks sum
 //! to is its mass term, and `rho` is the median over vertices of trace(diagonal block) over
@@ -20,23 +27,29 @@ use super::{LinearError, LinearSolver};
 use crate::math::block::BlockMatrix;
 use crate::math::{Mat3, Vec3};
 
-/// Stiffness over mass below which iterating wins at `CROSSOVER_VERTICES` vertices.
-const CROSSOVER_RATIO: f64 = 900.0;
-const CROSSOVER_VERTICES: f64 = 10_000.0;
-/// Growth of that ratio with the number of vertices.
-const CROSSOVER_EXPONENT: f64 = 1.2;
+/// Stiffness over mass below which iterating wins on large garments.
+const CROSSOVER_RATIO: f64 = 700.0;
+/// Vertices below which the direct solver gains.
+const CROSSOVER_VERTICES: f64 = 5_000.0;
+/// How fast it gains.
+const CROSSOVER_EXPONENT: f64 = 1.7;
 
-/// A solver by its number in the settings: 0 chooses for each matrix, 1 sparse Cholesky, 2
-/// conjugate gradients with block Jacobi, 3 with incomplete Cholesky. Other numbers are taken as
-/// 0: the settings refuse them at the door.
+/// Vertices below which either takes less than some milliseconds and Cholesky is not worth
+/// comparing.
+const ALWAYS_DIRECT: usize = 800;
+
+/// A solver by its number in the settings, for `n` block rows: 0 chooses for each matrix, 1 sparse
+/// Cholesky, 2 conjugate gradients with block Jacobi, 3 with incomplete Cholesky. Other numbers are
+/// taken as 0: the settings refuse them at the door.
 ///
 /// `priorities` (see [`super::ordering`]), one for each block row, mark the vertices of seams for
 /// the incomplete factorization.
-pub fn solver(kind: u32, priorities: Option<&[u8]>) -> Box<dyn LinearSolver> {
+pub fn solver(kind: u32, n: usize, priorities: Option<&[u8]>) -> Box<dyn LinearSolver> {
     match kind {
         1 => Box::new(Direct::new()),
         2 => Box::new(ConjugateGradients::new(Box::new(BlockJacobi::new()))),
         3 => Box::new(incomplete(priorities)),
+        _ if n < ALWAYS_DIRECT => Box::new(Direct::new()),
         _ => Box::new(Automatic::new(priorities)),
     }
 }
@@ -98,7 +111,8 @@ impl Automatic {
 
 /// Whether iterating is the faster way for this size and stiffness ratio.
 pub fn iterates(n: usize, ratio: f64) -> bool {
-    ratio < CROSSOVER_RATIO * (n as f64 / CROSSOVER_VERTICES).powf(CROSSOVER_EXPONENT)
+    let size = (n as f64 / CROSSOVER_VERTICES).min(1.0);
+    ratio < CROSSOVER_RATIO * size.powf(CROSSOVER_EXPONENT)
 }
 
 impl LinearSolver for Automatic {

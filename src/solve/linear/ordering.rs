@@ -8,6 +8,7 @@
 //! the priorities) alone.
 
 use crate::math::block::BlockPattern;
+use crate::tri::GarmentMesh;
 
 /// Priority of a vertex that emits seam springs.
 pub const EMITTING: u8 = 0;
@@ -15,6 +16,19 @@ pub const EMITTING: u8 = 0;
 pub const RECEIVING: u8 = 1;
 /// Priority of every other vertex.
 pub const ORDINARY: u8 = 2;
+
+/// Priorities of a garment's vertices; one that both emits and receives counts as emitting.
+pub fn seam_priorities(mesh: &GarmentMesh) -> Vec<u8> {
+    let mut priorities = vec![ORDINARY; mesh.uv.len()];
+    let links = || mesh.seams.iter().flat_map(|s| &s.links);
+    for v in links().flat_map(|l| l.edge) {
+        priorities[v as usize] = RECEIVING;
+    }
+    for link in links() {
+        priorities[link.vertex as usize] = EMITTING;
+    }
+    priorities
+}
 
 /// Block rows in the order of their elimination: `order[new] = old`.
 ///
