@@ -89,7 +89,7 @@ pub struct Sim {
 impl Sim {
     /// Triangulates and compiles the garment; its vertices stand where the panels are placed.
     pub fn new(garment: &Garment, options: &SimOptions) -> Result<Self> {
-        garment.check(options.settings.max_vertices as usize)?;
+        garment.check()?;
         if !garment.blend_regions.is_empty() {
             return Err(Error::unsupported(
                 "the garment has a blend region, and this version simulates triangles only",

@@ -40,7 +40,7 @@ impl Scene {
                 Ok(reader.scene(&object))
             } else if object.has("toile_garment") || object.has("pattern") {
                 let (garment, notes) = garment_from_node(&root, base_dir)?;
-                reader.keep(garment.check(crate::solve::settings::Settings::default().max_vertices as usize));
+                reader.keep(garment.check());
                 Ok(Some(Scene {
                     notes,
                     ..Scene::new(garment)
@@ -180,7 +180,7 @@ impl Reader<'_> {
             }),
         };
         let (garment, notes) = self.keep(read)?;
-        let checked = garment.check(crate::solve::settings::Settings::default().max_vertices as usize).map_err(|e| e.at(&node.path));
+        let checked = garment.check().map_err(|e| e.at(&node.path));
         self.keep(checked);
         Some((garment, notes))
     }

@@ -1,6 +1,7 @@
 //! One compiled system with what is needed to advance it: terms, matrix, linear solver, threads.
 
-use super::linear::LinearSolver;
+use super::linear::ordering::seam_priorities;
+use super::linear::{LinearSolver, choose};
 use super::newton::{Inertia, Problem, Summary, Tolerance, Work, largest};
 use super::settings::Settings;
 use crate::error::Result;
@@ -50,10 +51,7 @@ impl Engine {
     pub fn new(system: System, settings: &Settings) -> Self {
         let n = system.cloth.mesh.uv.len();
         let assembler = Assembler::new(n, &system.terms);
-        let linear = super::linear::choose::solver(
-            settings.linear_kind as u32,
-            Some(&system.seam_priorities()),
-        );
+        let linear = linear_solver(&system, settings);
         Self {
             assembler,
             linear,
@@ -74,10 +72,7 @@ impl Engine {
             self.workers = Workers::new(settings.threads as usize);
         }
         if settings.linear_kind.to_bits() != self.settings.linear_kind.to_bits() {
-            self.linear = super::linear::choose::solver(
-                settings.linear_kind as u32,
-                Some(&self.system.seam_priorities()),
-            );
+            self.linear = linear_solver(&self.system, settings);
         }
         self.system.set_options(&settings.into())?;
         self.settings = settings.clone();
@@ -182,7 +177,8 @@ impl Engine {
         } else if !dynamic && summary.last_length == 0.0 {
             Some("the line search found no decrease")
         } else {
-            inadmissible(system, &self.start, &x, dynamic)
+            let at = Configuration { x: &x, x0: &self.start, inv_dt, world: &world };
+            inadmissible(system, &at, dynamic)
         };
         if let Some(reason) = refused {
             return Ok(Attempt::Rejected(reason, summary));
@@ -301,13 +297,19 @@ impl Engine {
     }
 }
 
+fn linear_solver(system: &System, settings: &Settings) -> Box<dyn LinearSolver> {
+    let mesh = &system.cloth.mesh;
+    let priorities = seam_priorities(mesh);
+    choose::solver(settings.linear_kind as u32, mesh.uv.len(), Some(&priorities))
+}
+
 /// Why a converged substep may still not stand.
 fn inadmissible(
     system: &System,
-    start: &[Vec3],
-    x: &[Vec3],
+    at: &Configuration<'_>,
     dynamic: bool,
 ) -> Option<&'static str> {
+    let (start, x) = (at.x0, at.x);
     let bodies = &system.bodies;
     for b in 0..bodies.count() {
         let limit = system.depth_limit(b);
@@ -320,6 +322,9 @@ fn inadmissible(
                 return Some("a vertex passed through a body");
             }
         }
+    }
+    if system.terms.iter().any(|term| term.max_step(at) < 1.0) {
+        return Some("cloth would pass through itself");
     }
     if dynamic && system.largest_stretch_change(start, x) > 0.2 {
         return Some("an edge changed its length too much");

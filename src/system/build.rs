@@ -94,21 +94,6 @@ impl System {
         (2.0 * self.bodies.contact(body).thickness).max(4e-3)
     }
 
-    /// Priority of each vertex in an incomplete factorization: emitting seam vertices 2, receiving
-    /// ones 1, all others 0 (Umetani et al. 2011, section 7).
-    pub fn seam_priorities(&self) -> Vec<u8> {
-        let mut priority = vec![0; self.cloth.mesh.uv.len()];
-        for link in self.cloth.mesh.seams.iter().flat_map(|s| &s.links) {
-            for v in link.edge {
-                priority[v as usize] = priority[v as usize].max(1);
-            }
-        }
-        for link in self.cloth.mesh.seams.iter().flat_map(|s| &s.links) {
-            priority[link.vertex as usize] = 2;
-        }
-        priority
-    }
-
     /// Largest change of an edge's relative length between two configurations.
     pub fn largest_stretch_change(&self, start: &[Vec3], x: &[Vec3]) -> f64 {
         self.edges

@@ -149,6 +149,11 @@ pub trait Term: Send + Sync {
         let _ = (state, at);
         false
     }
+    /// Admissible part of the motion from `x0` to `x`, 1 for all of it.
+    fn max_step(&self, at: &Configuration<'_>) -> f64 {
+        let _ = at;
+        1.0
+    }
     /// After an accepted step: moves friction anchors and other plastic state.
     fn accept(&mut self, at: &Configuration<'_>, state: &mut State) {
         let _ = (at, state);

@@ -144,7 +144,7 @@ pub(crate) fn mannequin(path: &Path, cell: f64) -> Done {
             "--cell {cell} must be finite and not negative"
         ))));
     }
-    let (positions, triangles) = toile::body::mannequin::mannequin(cell)?.display_mesh();
+    let (positions, triangles) = toile::body::mannequin::body(cell)?.display_mesh();
     let text = toile::readout::export::obj::to_obj(&positions, &triangles, &[], &[], &[]);
     file(path, text.as_bytes())?;
     Ok(ExitCode::SUCCESS)

@@ -186,7 +186,7 @@ fn write(
         .write_png(&dir.join("picture.png"))
         .map_err(not_written)?;
     let svg = toile::pattern::export::to_svg(&scene.garment, 0.01);
-    file(&dir.join("pattern.svg"), svg.as_bytes())?;
+    file(&dir.join("pattern.svg"), svg?.as_bytes())?;
     file(&dir.join("state.bin"), &sim.save()?)
 }
 

@@ -2,7 +2,7 @@
 
 use super::{file_text, pose, pose_keys};
 use crate::body::Body;
-use crate::body::mannequin::mannequin;
+use crate::body::mannequin;
 use crate::error::Result;
 use crate::pattern::import::read::{Node, Object};
 use crate::readout::export::obj::read_positions;
@@ -113,7 +113,7 @@ fn geometry(object: &Object<'_>, shape: &str, scale: f64, base_dir: Option<&Path
             }
             Body::obj(&path, scale, cell)
         }
-        _ => mannequin(cell),
+        _ => mannequin::body(cell),
     }
 }
 

@@ -279,6 +279,10 @@ impl Term for SelfContact {
     }
 
     /// Friction anchors do not turn with the cloth.
+    fn max_step(&self, at: &Configuration<'_>) -> f64 {
+        self.max_travel(at.x0, at.x)
+    }
+
     fn is_internal(&self) -> bool {
         false
     }
