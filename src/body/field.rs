@@ -474,12 +474,12 @@ fn assemble(
                 kept: NONE,
                 ..Draft::default()
             };
-            if let (Some((level, _, _)), Some(changed)) = (&old, &changed) {
-                if !changed[i] {
-                    draft.kept = level.slot(brick);
-                    if draft.kept == NONE {
-                        continue;
-                    }
+            if let (Some((level, _, _)), Some(changed)) = (&old, &changed)
+                && !changed[i]
+            {
+                draft.kept = level.slot(brick);
+                if draft.kept == NONE {
+                    continue;
                 }
             }
             drafts.push(draft);
@@ -659,7 +659,7 @@ fn correct(slot: usize, around: &[u32; 6], f: &[Brick], out: &mut Brick) {
         let mut sum = 0.0;
         for d in 0..3 {
             let stride = 1usize << (4 - 2 * d);
-            let i = n / stride & 3;
+            let i = (n / stride) & 3;
             let base = n - i * stride;
             let at = |m: usize| f64::from(own[base + m * stride]);
             sum += match (i, around[2 * d], around[2 * d + 1]) {
