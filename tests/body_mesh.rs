@@ -456,7 +456,7 @@ fn real_bodies_have_the_sign_of_their_winding_number() {
         let Some(path) = data(name) else { return };
         let start = cpu();
         let body = Body::obj(&path, 1.0, 0.005).unwrap();
-        let built = (cpu() - start);
+        let built = cpu() - start;
         let (bricks, bytes) = body.field_size().unwrap();
         println!(
             "{name}: {:?} Euler {}",
