@@ -1,5 +1,7 @@
 //! The mannequin: closed, of the stated measures, and walking.
 
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 use toile::body::mannequin;
 use toile::math::Vec3;
 
@@ -15,11 +17,11 @@ fn cut(v: &[Vec3], t: &[[u32; 3]], y: f64, limit: f64) -> (f64, f64) {
                 ends.push(a.lerp(&b, (y - a.y) / (b.y - a.y)));
             }
         }
-        if let [a, b] = ends[..] {
-            if a.x.abs() < limit {
-                length += (b - a).norm();
-                wide = wide.max(a.x.abs()).max(b.x.abs());
-            }
+        if let [a, b] = ends[..]
+            && a.x.abs() < limit
+        {
+            length += (b - a).norm();
+            wide = wide.max(a.x.abs()).max(b.x.abs());
         }
     }
     (length, wide)

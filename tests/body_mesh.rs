@@ -1,7 +1,9 @@
 //! Mesh bodies: exactness, derivatives, signs, limits, real bodies.
 
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 use std::path::PathBuf;
-use std::time::Instant;
+use std::time::Duration;
 use toile::body::Body;
 use toile::math::Vec3;
 
@@ -24,6 +26,13 @@ impl Random {
     fn point(&mut self, r: f64) -> Vec3 {
         Vec3::new(self.within(-r, r), self.within(-r, r), self.within(-r, r))
     }
+}
+
+/// Processor time of this thread; wall time is of no use on a shared machine.
+fn cpu() -> Duration {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
+    let nanos = text.split(' ').next().and_then(|w| w.parse().ok());
+    Duration::from_nanos(nanos.unwrap_or(0))
 }
 
 type Soup = (Vec<[f64; 3]>, Vec<[u32; 3]>);
@@ -128,7 +137,7 @@ fn mesh_sphere_and_torus_distance_and_gradient_are_close_to_analytic() {
         let x = r.point(0.5);
         let u = x.xz().norm() - 0.3;
         let d = (u * u + x.y * x.y).sqrt();
-        if !(0.05..0.15).contains(&d) {
+        if !(0.07..0.13).contains(&d) {
             continue;
         }
         let got = ring.distance(&x);
@@ -445,9 +454,9 @@ fn compare(body: &Body, seed: u64, count: usize) -> (usize, usize, usize, f64, f
 fn real_bodies_have_the_sign_of_their_winding_number() {
     for name in ["mean_all.obj", "makehuman_body_closed_m.obj"] {
         let Some(path) = data(name) else { return };
-        let start = Instant::now();
+        let start = cpu();
         let body = Body::obj(&path, 1.0, 0.005).unwrap();
-        let built = start.elapsed();
+        let built = cpu() - start;
         let (bricks, bytes) = body.field_size().unwrap();
         println!(
             "{name}: {:?} Euler {}",
@@ -474,28 +483,28 @@ fn real_bodies_have_the_sign_of_their_winding_number() {
                 v[t[0] as usize] + r.point(0.01)
             })
             .collect();
-        let start = Instant::now();
+        let start = cpu();
         let mut sum = 0.0;
         for _ in 0..10 {
             for x in &points {
                 sum += body.distance(x).gradient.x;
             }
         }
-        let each = start.elapsed() / 200_000;
+        let each = (cpu() - start) / 200_000;
         println!("  query {each:?} ({sum:.1})");
         let all: Vec<Vec3> = v.iter().map(|p| p * 1.01).collect();
-        let start = Instant::now();
+        let start = cpu();
         let grown = body.deformed(&all).unwrap();
-        println!("  deformed everywhere in {:?}", start.elapsed());
+        println!("  deformed everywhere in {:?}", (cpu() - start));
         let (_, far, ..) = compare(&grown, 11, 1000);
         assert_eq!(far, 0);
         let arm: Vec<Vec3> = v
             .iter()
             .map(|p| p + Vec3::new(0.0, 0.0, 0.3 * (p.x - 0.25).max(0.0)))
             .collect();
-        let start = Instant::now();
+        let start = cpu();
         let waved = body.deformed(&arm).unwrap();
-        println!("  one arm deformed in {:?}", start.elapsed());
+        println!("  one arm deformed in {:?}", (cpu() - start));
         let (_, far, ..) = compare(&waved, 12, 1000);
         assert_eq!(far, 0);
     }

@@ -1,5 +1,7 @@
 //! Analytic and grid bodies, and OBJ text of any kind.
 
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 use toile::body::Body;
 use toile::math::Vec3;
 

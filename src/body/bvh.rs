@@ -163,13 +163,15 @@ impl Near<'_> {
 /// and `rho` off the axis its distance is `sqrt(z^2 + max(0, rho - radius)^2)`.
 #[inline]
 fn disc_beyond(e: &Vec3, normal: &Vec3, radius: f64, reach: f64) -> bool {
+    let e2 = e.norm_squared();
     let z = normal.dot(e);
     let room = reach * reach - z * z;
-    if room < 0.0 {
+    // the sphere first: it needs no root
+    if room < 0.0 || e2 > (reach + radius) * (reach + radius) {
         return true;
     }
     let rho = radius + room.sqrt();
-    e.norm_squared() - z * z > rho * rho
+    e2 - z * z > rho * rho
 }
 
 #[derive(Clone, Debug)]

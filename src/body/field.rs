@@ -25,8 +25,10 @@ use crate::math::parallel::Workers;
 
 /// Largest memory of a field while it is built [bytes].
 const MAX_BYTES: f64 = 1e9;
-/// Distance from a stored brick's centre to the surface, in spacings.
+/// Distance from a stored brick's centre to the surface, in spacings, on the finest level and on
+/// the others: there it only has to pass the finest one's.
 const BAND: f64 = 6.2;
+const COARSE_BAND: f64 = 4.5;
 /// Half diagonal of a brick's nodes, in spacings: 1.5 sqrt(3), rounded up.
 const RADIUS: f64 = 2.6;
 /// A level with at most this many bricks in its box is the top and stored whole.
@@ -435,7 +437,13 @@ fn assemble(
     let top = levels.len() - 1;
     for l in 0..levels.len() {
         let s = levels[l].h;
-        let band = if l == top { f64::INFINITY } else { BAND * s };
+        let band = if l == top {
+            f64::INFINITY
+        } else if l == 0 {
+            BAND * s
+        } else {
+            COARSE_BAND * s
+        };
         // bricks that may be stored, and those whose numbers may have changed
         let near = if l == top {
             vec![true; levels[l].slots.len()]
@@ -474,12 +482,12 @@ fn assemble(
                 kept: NONE,
                 ..Draft::default()
             };
-            if let (Some((level, _, _)), Some(changed)) = (&old, &changed) {
-                if !changed[i] {
-                    draft.kept = level.slot(brick);
-                    if draft.kept == NONE {
-                        continue;
-                    }
+            if let (Some((level, _, _)), Some(changed)) = (&old, &changed)
+                && !changed[i]
+            {
+                draft.kept = level.slot(brick);
+                if draft.kept == NONE {
+                    continue;
                 }
             }
             drafts.push(draft);
@@ -513,7 +521,7 @@ fn assemble(
                     let c = level.center(draft.brick);
                     draft.center = source.tree.distance(&c, &mut hint);
                 }
-                sample(level, source.tree, draft, hint, &mut scratch);
+                sample(level, source.tree, draft, hint, l == 0, &mut scratch);
             }
         });
         drafts.retain(|d| d.stored);
@@ -541,18 +549,20 @@ fn inside(level: &Level, rows: &[Rows; 3], source: Source<'_>, brick: [i64; 3]) 
 }
 
 /// Signed distances of a brick's nodes, exact. Neighbouring nodes follow each other, and each begins
-/// with the triangle that was nearest to the one before.
+/// with the triangle that was nearest to the one before. A `fine` brick first lists the triangles
+/// that can be nearest to any of its nodes; a coarse one has too many of them.
 fn sample<'a>(
     level: &Level,
     tree: &'a Bvh,
     draft: &mut Draft,
     hint: usize,
+    fine: bool,
     scratch: &mut Vec<Near<'a>>,
 ) {
     let center = level.center(draft.brick);
     let radius = RADIUS * level.h;
     // the nearest triangle of any node is within center distance + 2 radii of the centre
-    let few = tree.within(&center, draft.center + 2.0 * radius, MANY, scratch);
+    let few = fine && tree.within(&center, draft.center + 2.0 * radius, MANY, scratch);
     let mut hint = if few { 0 } else { hint };
     draft.distances = vec![0.0; 64];
     for step in 0..64 {
@@ -659,7 +669,7 @@ fn correct(slot: usize, around: &[u32; 6], f: &[Brick], out: &mut Brick) {
         let mut sum = 0.0;
         for d in 0..3 {
             let stride = 1usize << (4 - 2 * d);
-            let i = n / stride & 3;
+            let i = (n / stride) & 3;
             let base = n - i * stride;
             let at = |m: usize| f64::from(own[base + m * stride]);
             sum += match (i, around[2 * d], around[2 * d + 1]) {

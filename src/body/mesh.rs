@@ -77,7 +77,7 @@ pub(super) fn finite_positions(positions: &[[f64; 3]]) -> Result<Vec<Vec3>> {
 fn check_finite(positions: &[Vec3]) -> Result<()> {
     match positions
         .iter()
-        .position(|p| p.iter().any(|c| !(c.abs() <= 1e9)))
+        .position(|p| p.iter().any(|c| c.is_nan() || c.abs() > 1e9))
     {
         Some(v) => Err(Error::argument(format!(
             "vertex {v} is ({}, {}, {}); coordinates must be finite and within 1e9 m",
@@ -118,7 +118,7 @@ impl Topology {
         edges.check_closed(positions)?;
         let (mut volume, area) = measure(positions, &welded);
         let size = extent(positions, &welded);
-        if !(volume.abs() > 1e-9 * size * size * size) {
+        if volume.is_nan() || volume.abs() <= 1e-9 * size * size * size {
             return Err(Error::geometry(format!(
                 "the mesh encloses {volume} m^3 within an extent of {size} m; a body needs volume"
             )));
@@ -191,7 +191,7 @@ impl Topology {
             }
         }
         let (volume, _) = measure(positions, &self.welded);
-        if !(volume > 1e-9 * size * size * size) {
+        if volume.is_nan() || volume <= 1e-9 * size * size * size {
             return Err(Error::geometry(format!(
                 "the deformed mesh encloses {volume} m^3 within an extent of {size} m; it is flat \
                  or inside out"

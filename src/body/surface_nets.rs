@@ -162,7 +162,7 @@ fn project(f: &dyn Fn(&Vec3) -> f64, start: Vec3, cell: f64) -> Vec3 {
             (f(&(p + s)) - f(&(p - s))) / (2.0 * e)
         });
         let g2 = g.norm_squared();
-        if !(g2 > 1e-12) || value.abs() < 1e-10 * cell {
+        if g2.is_nan() || g2 <= 1e-12 || value.abs() < 1e-10 * cell {
             break;
         }
         let next = p - g * (value / g2);
