@@ -44,7 +44,7 @@ pub fn outside(pieces: &[Piece], distance: f64) -> Result<Vec<Vec<Vec2>>> {
             let middle = a + 0.5 * (w[0] + w[1]) * (b - a);
             let clear = pieces
                 .iter()
-                .all(|p| point_distance(middle, p.a, p.b) >= distance * 0.999 - tolerance);
+                .all(|p| point_distance(middle, p.a, p.b) >= distance - tolerance);
             if w[1] > w[0] && clear && !on_cloth(middle) {
                 kept.push([a + w[0] * (b - a), a + w[1] * (b - a)]);
             }
@@ -64,37 +64,48 @@ fn moved_pieces(pieces: &[Piece], distance: f64) -> Vec<[Vec2; 2]> {
     for p in pieces {
         area[p.ring] += cross(p.a, p.b);
     }
-    let mut moved = Vec::new();
-    for p in pieces {
-        // the cloth lies left of a counter-clockwise outline, right of a counter-clockwise hole
+    // the cloth lies left of a counter-clockwise outline, right of a counter-clockwise hole
+    let outward = |p: &Piece| {
         let side = if (area[p.ring] > 0.0) == (p.ring == 0) {
             1.0
         } else {
             -1.0
         };
-        let outward = |d: Vec2| side * Vec2::new(d.y, -d.x).normalize();
-        let (n, next) = (outward(p.b - p.a), &pieces[p.next]);
-        moved.push([p.a + distance * n, p.b + distance * n]);
-        let m = outward(next.b - next.a);
-        let turn = cross(n, m).atan2(n.dot(&m));
-        // where the corner closes, the moved pieces cross and an arc is cut off again
-        let steps = ((turn.abs() / ARC_STEP).ceil() as usize).max(1);
-        let mut from = p.b + distance * n;
-        for k in 0..=steps {
-            // corners of a polygon around the circle, so that its sides keep the distance
-            let (angle, reach) = if k == steps {
-                (turn, distance)
-            } else {
-                let half = 0.5 * turn / steps as f64;
-                ((2 * k + 1) as f64 * half, distance / half.cos())
+        side * Vec2::new(p.b.y - p.a.y, p.a.x - p.b.x).normalize()
+    };
+    // corner after each piece: where the moved piece ends, the arc, where the next one starts
+    let corners: Vec<Vec<Vec2>> = pieces
+        .iter()
+        .map(|p| {
+            let (n, m) = (outward(p), outward(&pieces[p.next]));
+            let turn = cross(n, m).atan2(n.dot(&m));
+            let at = |angle: f64, reach: f64| {
+                let (sin, cos) = angle.sin_cos();
+                p.b + reach * Vec2::new(cos * n.x - sin * n.y, sin * n.x + cos * n.y)
             };
-            let (sin, cos) = angle.sin_cos();
-            let to = p.b + reach * Vec2::new(cos * n.x - sin * n.y, sin * n.x + cos * n.y);
-            if (to - from).norm() > 1e-9 * distance {
-                moved.push([from, to]);
+            if turn.abs() <= ARC_STEP {
+                // along a curve the moved pieces meet in one point, on either side of it
+                return vec![at(0.5 * turn, distance / (0.5 * turn).cos())];
             }
-            from = to;
-        }
+            // corners of a polygon around the circle, so that its sides keep the distance; where
+            // the corner closes, the moved pieces cross and the arc is cut off again
+            let steps = (turn.abs() / ARC_STEP).ceil() as usize;
+            let half = 0.5 * turn / steps as f64;
+            let mut corner = vec![at(0.0, distance)];
+            corner.extend((0..steps).map(|k| at((2 * k + 1) as f64 * half, distance / half.cos())));
+            corner.push(at(turn, distance));
+            corner
+        })
+        .collect();
+    let mut before = vec![0; pieces.len()];
+    for (k, p) in pieces.iter().enumerate() {
+        before[p.next] = k;
+    }
+    let mut moved = Vec::new();
+    for (k, corner) in corners.iter().enumerate() {
+        let start = &corners[before[k]];
+        moved.push([start[start.len() - 1], corner[0]]);
+        moved.extend(corner.windows(2).map(|w| [w[0], w[1]]));
     }
     moved
 }
