@@ -4,21 +4,21 @@
 //! at a vertex (discrete shells, Grinspun et al. 2003; angles by `atan2`, never `acos`)
 //!
 //! ```text
-//! r = sum_e c_e (theta_e - theta0_e),   V = 1/(2A) sum_k d_k r_k^2,   c_e = l_e/2 (n1^2, sqrt2 n1 n2, n2^2)
+//! r = sum_e c_e (theta_e - theta0_e),   V = 1/2 r . W r,   c_e = l_e/2 (n1^2, sqrt2 n1 n2, n2^2)
 //! ```
 //!
-//! `Psd` is the Gauss-Newton part `J^T diag(d/A) J`, `J = sum_e c_e dtheta_e/dx`; `Exact` adds
-//! `sum_e (c_e . diag(d/A) r) d^2 theta_e / dx^2`. Damping replaces `r` by the change of `r` since the
+//! `Psd` is the Gauss-Newton part `J^T W J`, `J = sum_e c_e dtheta_e/dx`; `Exact` adds
+//! `sum_e (c_e . W r) d^2 theta_e / dx^2`. Damping replaces `r` by the change of `r` since the
 //! start of the step, times `beta/dt`; rigid motion is not damped. SI units. Limits: an angle jumps
 //! by a full turn where two triangles fold through each other; below 1e-4 of its rest size a
 //! triangle counts as degenerate and the derivatives are bounded, no longer exact.
 
-use super::bending_fan::{FanGroup, FanRest, MAX_HINGES, fan_groups, measure_with_rate, rigidity};
+use super::bending_fan::{FanGroup, FanRest, MAX_HINGES, fan_groups};
 use super::term::{Configuration, HessianKind, MAX_ARITY, RestChange, Stencils, Term};
 use crate::cloth::Cloth;
 use crate::error::{Error, Result};
 use crate::math::geometry::{dihedral, dihedral_gradient, dihedral_hessian, hinges, wrap_angle};
-use crate::math::{Mat3, Vec2, Vec3};
+use crate::math::{Mat3, Vec3};
 use crate::pattern::BendingModel;
 
 /// Bending of all vertices with the same number of neighbours.
@@ -109,7 +109,7 @@ impl Hinge {
         let fan = &self.group.fans[e];
         let rate = fan.damping * at.inv_dt;
         let (now, since) = self.bend(e, at, &fan.measure.weights, rate > 0.0);
-        fan.rigidity.component_mul(&(now + since * rate)) / fan.measure.area
+        fan.stiffness * (now + since * rate)
     }
 
     /// `out = sum_e factor_e dtheta_e/dx`.
@@ -148,8 +148,8 @@ impl Term for Hinge {
         let fan = &self.group.fans[e];
         let rate = fan.damping * at.inv_dt;
         let (now, since) = self.bend(e, at, &fan.measure.weights, rate > 0.0);
-        let quadratic = |r: &Vec3| fan.rigidity.dot(&r.component_mul(r));
-        (quadratic(&now) + rate * quadratic(&since)) / (2.0 * fan.measure.area)
+        let quadratic = |r: &Vec3| r.dot(&(fan.stiffness * r));
+        0.5 * (quadratic(&now) + rate * quadratic(&since))
     }
 
     fn gradient(&self, e: usize, at: &Configuration<'_>, out: &mut [Vec3]) {
@@ -170,8 +170,7 @@ impl Term for Hinge {
                 b[i] += weights[k] * g.transpose();
             }
         }
-        let scale = (1.0 + fan.damping * at.inv_dt) / fan.measure.area;
-        let d = Mat3::from_diagonal(&(fan.rigidity * scale));
+        let d = fan.stiffness * (1.0 + fan.damping * at.inv_dt);
         for i in 0..arity {
             let left = b[i].transpose() * d;
             for j in 0..=i {
@@ -205,11 +204,7 @@ impl Term for Hinge {
     ) {
         let (fan, vertices) = (&self.group.fans[e], self.vertices(e));
         let fabric = &change.fabrics[fan.fabric];
-        let duv: Vec<Vec2> = vertices
-            .iter()
-            .map(|&v| fan.rotation * change.uv[v as usize])
-            .collect();
-        let (_, rates) = measure_with_rate(&fan.uv, &duv, fan.closed);
+        let (rates, dstiffness) = fan.rates(vertices, change);
         let (rate, drate) = (
             fan.damping * at.inv_dt,
             fabric.damping_stiffness * at.inv_dt,
@@ -218,11 +213,8 @@ impl Term for Hinge {
         let (now, since) = self.bend(e, at, &fan.measure.weights, damped);
         let (dnow, dsince) = self.bend(e, at, &rates.weights, damped);
         let (total, dtotal) = (now + since * rate, dnow + dsince * rate + since * drate);
-        let area = fan.measure.area;
-        let moment = fan.rigidity.component_mul(&total) / area;
-        let dmoment =
-            (rigidity(fabric).component_mul(&total) + fan.rigidity.component_mul(&dtotal)) / area
-                - moment * (rates.area / area);
+        let moment = fan.stiffness * total;
+        let dmoment = dstiffness * total + fan.stiffness * dtotal;
         self.spread(
             e,
             at,

@@ -6,19 +6,18 @@
 //! `w` of [`jump`](crate::math::geometry::jump), and
 //!
 //! ```text
-//! V = 1/(2A) sum_k d_k |R_k|^2 = 1/2 sum_ij K_ij x_i . x_j,   K_ij = b_i . diag(d/A) b_j
+//! V = 1/2 tr(R^T W R) = 1/2 sum_ij K_ij x_i . x_j,   K_ij = b_i . W b_j
 //! ```
 //!
-//! For isometric deformation `|R_k|/A` are the curvatures, so that a cylinder costs what the
+//! For isometric deformation the rows of `R` are along the normal and their lengths the bend, so that a cylinder costs what the
 //! material says, orthotropic fabrics included. Flat rest shape only. Damping is `beta/(2 dt)` of the
 //! same form in `x - x0`: the Hessian stays constant, at the price of a small drag on the rotation of
 //! curved cloth (of the order of beta times the bending force). SI units.
 
-use super::bending_fan::{FanGroup, fan_groups, measure_with_rate, rigidity};
+use super::bending_fan::{FanGroup, fan_groups};
 use super::term::{Configuration, HessianKind, RestChange, Stencils, Term};
 use crate::cloth::Cloth;
-use crate::math::geometry::{jump, jump_rate};
-use crate::math::{Mat3, Vec2, Vec3};
+use crate::math::{Mat3, Vec3};
 use crate::pattern::BendingModel;
 
 /// Quadratic bending of all vertices with the same number of neighbours.
@@ -41,12 +40,10 @@ impl QuadraticBending {
             .map(|group| {
                 let mut stiffness = Vec::with_capacity(blocks(group.arity) * group.fans.len());
                 for fan in &group.fans {
-                    let still = vec![Vec2::zeros(); fan.uv.len()];
-                    let (b, _) = operator(fan, &still);
-                    let d = fan.rigidity / fan.measure.area;
+                    let b = &fan.measure.operator;
                     for i in 0..b.len() {
                         for j in 0..=i {
-                            stiffness.push(b[i].component_mul(&d).dot(&b[j]));
+                            stiffness.push(b[i].dot(&(fan.stiffness * b[j])));
                         }
                     }
                 }
@@ -63,23 +60,6 @@ impl QuadraticBending {
     fn vertices(&self, e: usize) -> &[u32] {
         &self.group.vertices[self.group.arity * e..][..self.group.arity]
     }
-}
-
-/// Coefficients `b_j` of a fan and their rates when its flat vertices move.
-fn operator(fan: &super::bending_fan::FanRest, duv: &[Vec2]) -> (Vec<Vec3>, Vec<Vec3>) {
-    let (_, rates) = measure_with_rate(&fan.uv, duv, fan.closed);
-    let mut b = vec![Vec3::zeros(); fan.uv.len()];
-    let mut db = b.clone();
-    for k in 0..fan.hinge_count() {
-        let local = fan.local_hinge(k);
-        let (p, dp) = (local.map(|i| fan.uv[i]), local.map(|i| duv[i]));
-        let (w, dw) = (jump(&p), jump_rate(&p, &dp));
-        for (n, i) in local.into_iter().enumerate() {
-            b[i] += fan.measure.weights[k] * w[n];
-            db[i] += rates.weights[k] * w[n] + fan.measure.weights[k] * dw[n];
-        }
-    }
-    (b, db)
 }
 
 /// `1/2 sum_ij K_ij y_i . y_j`.
@@ -164,15 +144,8 @@ impl Term for QuadraticBending {
     ) {
         let (fan, v) = (&self.group.fans[e], self.vertices(e));
         let fabric = &change.fabrics[fan.fabric];
-        let duv: Vec<Vec2> = v
-            .iter()
-            .map(|&v| fan.rotation * change.uv[v as usize])
-            .collect();
-        let (_, rates) = measure_with_rate(&fan.uv, &duv, fan.closed);
-        let (b, db) = operator(fan, &duv);
-        let area = fan.measure.area;
-        let d = fan.rigidity / area;
-        let dd = rigidity(fabric) / area - d * (rates.area / area);
+        let (rates, dw) = fan.rates(v, change);
+        let (b, db) = (&fan.measure.operator, &rates.operator);
         let rate = fan.damping * at.inv_dt;
         let drate = fabric.damping_stiffness * at.inv_dt;
         // R and its rate, one column for each coordinate; with damping of the argument below
@@ -186,8 +159,7 @@ impl Term for QuadraticBending {
             r += b[i] * y(i).transpose();
             dr += db[i] * y(i).transpose() + b[i] * dy(i).transpose();
         }
-        let (d, dd) = (Mat3::from_diagonal(&d), Mat3::from_diagonal(&dd));
-        let (moment, dmoment) = (d * r, dd * r + d * dr);
+        let (moment, dmoment) = (fan.stiffness * r, dw * r + fan.stiffness * dr);
         for i in 0..v.len() {
             out[i] = moment.tr_mul(&db[i]) + dmoment.tr_mul(&b[i]);
         }

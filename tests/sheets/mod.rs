@@ -47,17 +47,20 @@ pub enum Pattern {
     DiagonalAcross,
     /// Squares at 45 degrees, split along the strip.
     DiagonalAlong,
+    /// Squares at 45 degrees, split across and along in turn.
+    DiagonalJack,
     /// Delaunay triangulation of a jittered grid.
     Delaunay,
     /// Same with a small jitter.
     FairDelaunay,
 }
 
-pub const PATTERNS: [Pattern; 6] = [
+pub const PATTERNS: [Pattern; 7] = [
     Pattern::Squares,
     Pattern::UnionJack,
     Pattern::DiagonalAcross,
     Pattern::DiagonalAlong,
+    Pattern::DiagonalJack,
     Pattern::Delaunay,
     Pattern::FairDelaunay,
 ];
@@ -95,16 +98,20 @@ pub fn rectangle(pattern: Pattern, length: f64, width: f64, n: usize) -> Flat {
                 }
             }
         }
-        Pattern::DiagonalAcross | Pattern::DiagonalAlong => {
+        Pattern::DiagonalAcross | Pattern::DiagonalAlong | Pattern::DiagonalJack => {
             // lattice points with i + j even; the border that the diagonals miss is filled in
             let s = h / std::f64::consts::SQRT_2;
             let nx = ((length / s / 2.0).round() as usize).max(1) * 2;
             let ny = ((width / s / 2.0).round() as usize).max(1) * 2;
             let mut index = std::collections::BTreeMap::new();
-            let across = pattern == Pattern::DiagonalAcross;
+            let is_across = |i: usize| match pattern {
+                Pattern::DiagonalAcross => true,
+                Pattern::DiagonalAlong => false,
+                _ => i % 2 == 0,
+            };
             for j in 0..=ny {
                 for i in 0..=nx {
-                    let border = if across {
+                    let border = if is_across(i) {
                         j == 0 || j == ny
                     } else {
                         i == 0 || i == nx
@@ -126,7 +133,7 @@ pub fn rectangle(pattern: Pattern, length: f64, width: f64, n: usize) -> Flat {
                     }
                     let center = get(i, j);
                     let (l, r, d, u) = (get(i - 1, j), get(i + 1, j), get(i, j - 1), get(i, j + 1));
-                    let halves = if across {
+                    let halves = if is_across(i as usize) {
                         let (d, u) = (d.or(center), u.or(center));
                         [[d, r, u], [d, u, l]]
                     } else {
