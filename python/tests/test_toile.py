@@ -1,0 +1,155 @@
+"""The package against the library: small garments, real calls."""
+
+import gc
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import toile
+
+SQUARE = [[0, 0], [0.4, 0], [0.4, 0.4], [0, 0.4]]
+# lies flat: u to +x, v to -z
+FLAT = (-np.sqrt(0.5), 0, 0, np.sqrt(0.5))
+
+
+def square(edge_length=0.05):
+    garment = toile.Garment("square", edge_length)
+    garment.add_panel("square", SQUARE, position=(-0.2, 0.5, 0.2), quaternion_xyzw=FLAT)
+    return garment
+
+
+def test_arrays_have_the_shapes_and_values_that_were_asked_for():
+    with toile.Sim(square()) as sim:
+        n = sim.info.vertices
+        assert sim.positions.shape == (n, 3) and sim.vertex_uv.shape == (n, 2)
+        assert sim.normals.shape == (n, 3) and sim.vertex_panels.tolist() == [0] * n
+        assert sim.triangles.shape[1] == 3 and sim.triangles.max() == n - 1
+        assert sim.vertex_active.tolist() == [1] * n
+        # flat, at y = 0.5, facing up
+        np.testing.assert_allclose(sim.positions[:, 1], 0.5, atol=1e-12)
+        np.testing.assert_allclose(sim.normals, np.tile([0, 1, 0], (n, 1)), atol=1e-9)
+        u = sim.vertex_uv
+        np.testing.assert_allclose(sim.positions[:, 0], u[:, 0] - 0.2, atol=1e-12)
+        assert not sim.positions.flags.writeable
+
+
+def test_free_fall_is_backward_euler_to_the_last_digits():
+    with toile.Sim(square()) as sim:
+        sim["air.drag"] = 0.0
+        sim["air.tangential"] = 0.0
+        sim["contact.self.enabled"] = 0.0
+        dt, steps = 0.01, 10
+        for _ in range(steps):
+            assert sim.step(dt).advanced == dt
+        fall = 9.81 * dt * dt * steps * (steps + 1) / 2
+        np.testing.assert_allclose(sim.positions[:, 1], 0.5 - fall, atol=1e-6)
+        assert abs(sim.time - 0.1) < 1e-12
+
+
+def test_cloth_comes_to_rest_on_a_sphere_and_the_wrench_is_its_weight():
+    with square(0.04) as garment, toile.Body.sphere(0.2) as ball, toile.Sim(garment) as sim:
+        index = sim.add_body(ball, friction=0.5)
+        sim.set_body_pose(index, (0, 0.25, 0))
+        seen = []
+        report = sim.drape(progress=lambda fraction, stage, residual: seen.append(fraction))
+        assert report.outcome == toile.Outcome.CONVERGED
+        assert report.min_gap > -1e-3 and seen == sorted(seen)
+        assert ball.distance((0, 0.3, 0))[0] == pytest.approx(0.1)
+        weight = 0.4 * 0.4 * 0.2 * 9.81
+        force, _ = sim.body_wrench(index)
+        np.testing.assert_allclose(force, [0, -weight, 0], atol=0.02 * weight)
+
+
+def test_an_exception_in_progress_comes_out_and_false_stops():
+    with toile.Sim(square()) as sim:
+        sim.pin([sim.locate(0, (0, 0)), sim.locate(0, (0.4, 0))])
+
+        def fail(*_):
+            raise KeyError("from the callback")
+
+        with pytest.raises(KeyError):
+            sim.drape(progress=fail)
+        assert sim.drape(progress=lambda *_: False).outcome == toile.Outcome.CANCELLED
+
+
+def test_saved_state_continues_bitwise():
+    with toile.Sim(square()) as sim:
+        sim.pin([0])
+        sim.step(0.01)
+        state = sim.save()
+        sim.step(0.01)
+        expected = sim.positions.copy()
+        sim.restore(state)
+        sim.step(0.01)
+        assert expected.tobytes() == sim.positions.tobytes()
+        with pytest.raises(toile.ToileError):
+            sim.restore(state[: len(state) // 2])
+        assert expected.tobytes() == sim.positions.tobytes()
+
+
+def test_errors_carry_the_text_of_the_library():
+    with pytest.raises(toile.UsageError, match="-1") as e:
+        toile.Body.sphere(-1.0)
+    assert e.value.status == -1 and e.value.name
+    with pytest.raises(toile.DataError):
+        toile.Garment.from_json("{")
+    with pytest.raises(toile.ToileError, match="no.such"):
+        toile.Sim(square())["no.such"] = 1.0
+    garment = square()
+    garment.close()
+    garment.close()
+    with pytest.raises(ValueError, match="closed"):
+        garment.to_json()
+    with pytest.raises(ValueError, match="shape"):
+        toile.Body.mesh([[0, 0]], [[0, 1, 2]])
+    with pytest.raises(ValueError, match="32 bits"):
+        toile.Body.mesh(np.zeros((3, 3)), [[0, 1, -2]])
+
+
+def test_a_view_keeps_the_simulation_alive():
+    sim = toile.Sim(square())
+    expected = sim.positions.copy()
+    view = sim.positions
+    del sim
+    gc.collect()
+    np.testing.assert_array_equal(view, expected)
+
+
+def test_json_and_svg_come_back():
+    garment = toile.Garment("two", 0.1)
+    a = garment.add_panel("a", SQUARE)
+    curved = [toile.Edge(0, 1), toile.Edge(1, 2, [0.5, 0.2]), (2, 3), toile.Edge(3, 0, radius=0.3)]
+    b = garment.add_panel("b", SQUARE, curved, position=(0, 0, -0.1))
+    assert garment.add_seam((a, 1), (b, 3)) == 0
+    garment.check()
+    again = toile.Garment.from_json(garment.to_json())
+    assert again.panel_names == ["a", "b"]
+    assert json.loads(again.to_json()) == json.loads(garment.to_json())
+    assert "<svg" in garment.to_svg()
+
+
+def test_a_scene_is_read_with_its_bodies_and_numbers():
+    scene = {
+        "toile": 1,
+        "garment": json.loads(square().to_json()),
+        "bodies": [{"shape": "sphere", "radius": 0.2}],
+        "numbers": {"solver.newton.max_iterations": 17},
+    }
+    with toile.Sim.from_scene(json.dumps(scene)) as sim:
+        assert sim["solver.newton.max_iterations"] == 17
+        positions, triangles = sim.body_mesh(0)
+        np.testing.assert_allclose(np.linalg.norm(positions, axis=1), 0.2, rtol=1e-6)
+        assert len(triangles) > 10
+
+
+def test_a_real_pattern_is_read():
+    data = os.environ.get("TOILE_DATA")
+    if not data:
+        assert os.environ.get("CI") != "true", "TOILE_DATA is unset"
+        pytest.skip("TOILE_DATA is unset")
+    path = Path(data) / "garmentcode" / "gen_tshirt_specification.json"
+    garment = toile.Garment.from_file(path)
+    assert len(garment.panel_names) > 3

@@ -1,0 +1,319 @@
+//! The command line: results, exit codes, texts, closed pipes.
+
+use serde_json::{Value, json};
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("toile-cli-{}-{name}", std::process::id()));
+        std::fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+
+    fn write(&self, name: &str, text: &str) -> PathBuf {
+        let path = self.0.join(name);
+        std::fs::write(&path, text).unwrap();
+        path
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+fn toile(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_toile"))
+        .args(args)
+        .output()
+        .unwrap()
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+fn code(output: &Output) -> i32 {
+    output.status.code().expect("ended by a signal")
+}
+
+/// A small square hung by one edge above a sphere.
+fn scene() -> Value {
+    json!({
+        "toile": 1,
+        "name": "hanging",
+        "garment": {
+            "toile_garment": 1,
+            "name": "square",
+            "edge_length": 0.04,
+            "panels": [{
+                "name": "square",
+                "vertices": [[0, 0], [0.3, 0], [0.3, 0.3], [0, 0.3]],
+                "edges": [[0, 1], [1, 2], [2, 3], [3, 0]],
+                "placement": {"translation": [-0.15, 0.5, 0]}
+            }]
+        },
+        "bodies": [{"name": "ball", "shape": "sphere", "radius": 0.1,
+                    "pose": {"position": [0, 0.3, 0.3]}}],
+        "pins": [{"panel": "square", "edge": 2}],
+        "run": {"duration": 0.1, "dt": 0.02, "frame_every": 1}
+    })
+}
+
+fn path(p: &Path) -> &str {
+    p.to_str().unwrap()
+}
+
+#[test]
+fn run_writes_a_complete_summary_models_pattern_and_picture() {
+    let folder = Folder::new("run");
+    let scene = folder.write("scene.json", &scene().to_string());
+    let out = folder.0.join("a/b");
+    let output = toile(&["run", path(&scene), "--out", path(&out), "--verify"]);
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    assert!(text(&output.stdout).contains("hanging"));
+    let summary: Value =
+        serde_json::from_slice(&std::fs::read(out.join("summary.json")).unwrap()).unwrap();
+    for key in [
+        "vertices",
+        "triangles",
+        "yarn_nodes",
+        "hybrid_nodes",
+        "unknowns",
+        "peak_memory_bytes",
+        "steps",
+        "newton_iterations",
+        "linear_iterations",
+        "wall_seconds",
+        "simulated_seconds",
+        "max_edge_strain",
+        "min_gap",
+        "kinetic_energy",
+        "potential_energy",
+        "residual",
+        "threads",
+        "max_seam_gap",
+        "further_second_motion",
+        "body_crossings",
+    ] {
+        assert!(summary[key].is_number(), "{key}: {}", summary[key]);
+    }
+    for key in ["outcome", "backend", "version", "name"] {
+        assert!(summary[key].is_string(), "{key}");
+    }
+    assert_eq!(summary["steps"], 5);
+    assert!((summary["simulated_seconds"].as_f64().unwrap() - 0.1).abs() < 1e-12);
+    assert!(summary["vertices"].as_u64().unwrap() > 50);
+    assert_eq!(summary["body_crossings"], 0);
+    // it hangs at rest: five steps later and a second later it hangs there still
+    assert!(summary["further_second_motion"].as_f64().unwrap() < 1e-3);
+    let read = |name: &str| std::fs::read(out.join(name)).unwrap();
+    let obj = text(&read("garment.obj"));
+    let lines = |p: &str| obj.lines().filter(|l| l.starts_with(p)).count() as u64;
+    assert_eq!(lines("v "), summary["vertices"].as_u64().unwrap());
+    assert_eq!(lines("f "), summary["triangles"].as_u64().unwrap());
+    assert_eq!(&read("scene.glb")[..4], b"glTF");
+    assert_eq!(&read("picture.png")[1..4], b"PNG");
+    assert_eq!(&read("garment.pc2")[..11], b"POINTCACHE2");
+    assert!(text(&read("pattern.svg")).contains("<svg"));
+
+    // the results start another run: from the saved state and from the model's positions
+    for initial in [
+        json!({"snapshot": "a/b/state.bin"}),
+        json!({"file": "a/b/garment.obj"}),
+    ] {
+        let mut again = self::scene();
+        again["initial"] = initial.clone();
+        again["run"] = json!({"drape": false, "duration": 0.02, "dt": 0.02});
+        let again = folder.write("again.json", &again.to_string());
+        let out = folder.0.join("again");
+        let output = toile(&["run", path(&again), "--out", path(&out), "--quiet"]);
+        assert_eq!(code(&output), 0, "{initial}: {}", text(&output.stderr));
+        assert!(output.stdout.is_empty());
+    }
+}
+
+#[test]
+fn numbers_of_the_command_line_reach_the_simulation() {
+    let folder = Folder::new("set");
+    let scene = folder.write("scene.json", &scene().to_string());
+    let vertices = |args: &[&str]| {
+        let output = toile(&[&["info", path(&scene)], args].concat());
+        assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+        let all = text(&output.stdout);
+        let line = all.lines().find(|l| l.starts_with("vertices")).unwrap();
+        line.split_whitespace()
+            .last()
+            .unwrap()
+            .parse::<usize>()
+            .unwrap()
+    };
+    let coarse = vertices(&["--edge-length", "0.1"]);
+    let fine = vertices(&["--set", "edge_length=0.02"]);
+    assert!(fine > 4 * coarse, "{coarse} {fine}");
+    for bad in [
+        &["--set", "solver.newton.max_iterations=-3"][..],
+        &["--set", "no.such.name=1"],
+        &["--edge-length", "NaN"],
+        &["--threads", "0"],
+    ] {
+        let output = toile(&[&["info", path(&scene)], bad].concat());
+        assert_eq!(code(&output), 1, "{bad:?}");
+        let error = text(&output.stderr);
+        assert!(error.starts_with("toile: error: "), "{error}");
+    }
+}
+
+#[test]
+fn refusals_have_their_exit_code_and_name_file_and_place() {
+    let folder = Folder::new("refused");
+    let mut broken = scene();
+    broken["bodies"][0]["radius"] = json!(-1);
+    broken["pins"][0]["edge"] = json!(44);
+    let broken = folder.write("broken.json", &broken.to_string());
+    let out = folder.0.join("out");
+
+    let output = toile(&["check", path(&broken)]);
+    assert_eq!(code(&output), 1);
+    let all = text(&output.stdout);
+    for words in [
+        "bodies[0]",
+        "pins[0].edge",
+        "44",
+        "2 problems",
+        "broken.json",
+    ] {
+        assert!(all.contains(words), "{words}: {all}");
+    }
+    let fine = folder.write("fine.json", &scene().to_string());
+    let output = toile(&["check", path(&fine)]);
+    assert_eq!(code(&output), 0, "{}", text(&output.stdout));
+
+    let output = toile(&["run", path(&broken), "--out", path(&out)]);
+    assert_eq!(code(&output), 1);
+    let error = text(&output.stderr);
+    assert!(
+        error.starts_with("toile: error: ") && error.contains("broken.json: bodies[0]"),
+        "{error}"
+    );
+    let output = toile(&["run", "gone.json", "--out", path(&out)]);
+    assert_eq!(code(&output), 1);
+    assert!(text(&output.stderr).contains("gone.json"));
+    let output = toile(&[
+        "run",
+        path(&fine),
+        "--out",
+        path(&out),
+        "--body",
+        "gone.obj",
+    ]);
+    assert_eq!(code(&output), 1);
+    assert!(text(&output.stderr).contains("gone.obj"));
+    // a file stands where the folder should be
+    let output = toile(&["run", path(&fine), "--out", path(&fine)]);
+    assert_eq!(code(&output), 4, "{}", text(&output.stderr));
+    // wrong command lines
+    for args in [&["run"][..], &["fly"], &["info", "--set", "x"], &[]] {
+        assert_eq!(code(&toile(args)), 2, "{args:?}");
+    }
+    assert_eq!(code(&toile(&["--version"])), 0);
+}
+
+#[test]
+fn schema_prints_every_key_and_parses_as_json() {
+    let output = toile(&["schema"]);
+    let all = text(&output.stdout);
+    for key in [
+        "bodies[].contact",
+        "friction",
+        "solver.newton.max_iterations",
+        "frame_every",
+    ] {
+        assert!(all.contains(key), "{key}");
+    }
+    let output = toile(&["schema", "--json"]);
+    let schema: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(
+        schema["properties"]["bodies"]["items"]["properties"]["radius"]["type"],
+        "number"
+    );
+}
+
+#[test]
+fn a_closed_pipe_ends_output_quietly() {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_toile"))
+        .args(["schema", "--json"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let mut error = String::new();
+    child
+        .stderr
+        .take()
+        .unwrap()
+        .read_to_string(&mut error)
+        .unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(0));
+    assert_eq!(error, "");
+}
+
+#[test]
+fn mannequin_is_a_closed_surface() {
+    let folder = Folder::new("mannequin");
+    let file = folder.0.join("m.obj");
+    let output = toile(&["mannequin", path(&file), "--cell", "0.02"]);
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    let obj = std::fs::read_to_string(&file).unwrap();
+    let mut edges: Vec<[u32; 2]> = Vec::new();
+    for line in obj.lines().filter(|l| l.starts_with("f ")) {
+        let v: Vec<u32> = line[2..]
+            .split_whitespace()
+            .map(|w| w.split('/').next().unwrap().parse().unwrap())
+            .collect();
+        for k in 0..3 {
+            let (a, b) = (v[k], v[(k + 1) % 3]);
+            edges.push([a.min(b), a.max(b)]);
+        }
+    }
+    edges.sort_unstable();
+    assert!(edges.len() > 1000);
+    assert!(edges.chunk_by(|a, b| a == b).all(|run| run.len() == 2));
+    let output = toile(&["mannequin", path(&file), "--cell", "nan"]);
+    assert_eq!(code(&output), 1);
+}
+
+#[test]
+fn a_real_pattern_on_a_real_body_is_built() {
+    let Some(data) = std::env::var_os("TOILE_DATA").map(PathBuf::from) else {
+        assert_ne!(
+            std::env::var("CI").as_deref(),
+            Ok("true"),
+            "TOILE_DATA is unset"
+        );
+        eprintln!("skipped: TOILE_DATA is unset");
+        return;
+    };
+    let pattern = data.join("garmentcode/gen_tshirt_specification.json");
+    let body = data.join("bodies/mean_all.obj");
+    let output = toile(&[
+        "info",
+        path(&pattern),
+        "--body",
+        path(&body),
+        "--edge-length",
+        "0.03",
+    ]);
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    let all = text(&output.stdout);
+    assert!(
+        all.contains("mean_all") && all.contains("gen_tshirt_specification"),
+        "{all}"
+    );
+}
