@@ -4,6 +4,7 @@
 //! before them in this list.
 
 pub mod body;
+pub mod capi;
 pub mod cloth;
 pub mod error;
 pub mod math;

@@ -1,0 +1,124 @@
+//! Time and rest: the step and the drape.
+
+use super::desc;
+use super::guard::{c_text, entry};
+use super::input;
+use super::log::{Log, TOILE_LOG_INFO, TOILE_LOG_WARNING};
+use super::sim::{SIMS, write};
+use super::status::toile_status;
+use super::types::{toile_drape_desc, toile_progress, toile_sim, toile_step_report};
+use crate::sim::{DrapeOptions, Outcome, Progress, StepReport};
+
+/// The report as C sees it.
+pub(super) fn report_for_c(report: &StepReport) -> toile_step_report {
+    toile_step_report {
+        struct_size: size_of::<toile_step_report>(),
+        outcome: report.outcome as u32,
+        reserved: 0,
+        newton_iterations: report.newton_iterations,
+        linear_iterations: report.linear_iterations,
+        substeps: report.substeps,
+        advanced: report.advanced,
+        residual: report.residual,
+        max_edge_strain: report.max_edge_strain,
+        min_gap: report.min_gap,
+        kinetic_energy: report.kinetic_energy,
+        potential_energy: report.potential_energy,
+        max_seam_gap: report.max_seam_gap,
+    }
+}
+
+fn tell(log: &Log, what: &str, report: &StepReport) {
+    let level = match report.outcome {
+        Outcome::IterationLimit => TOILE_LOG_WARNING,
+        _ => TOILE_LOG_INFO,
+    };
+    log.say(level, || {
+        format!(
+            "{what}: {}, {} substeps, {} Newton iterations, residual {:.3e} N",
+            report.outcome.name(),
+            report.substeps,
+            report.newton_iterations,
+            report.residual
+        )
+    });
+}
+
+/// Advances by exactly `dt` [s], in smaller steps inside where needed, or fails and leaves the
+/// simulation as it was. `report` may be NULL. TOILE_E_NO_ADMISSIBLE_STATE: pins or bodies ask for
+/// what cannot be; a shorter step may pass.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_step(
+    sim: *mut toile_sim,
+    dt: f64,
+    report: *mut toile_step_report,
+) -> toile_status {
+    entry!({
+        SIMS.get(sim.addr())?;
+        let dt = input::positive(dt, "dt")?;
+        desc::check_target(report, true)?;
+        let result = write(sim, |sim, log| {
+            let result = sim.step(dt)?;
+            if result.outcome != Outcome::Converged {
+                tell(log, "step", &result);
+            }
+            Ok(result)
+        })?;
+        desc::write(report, &report_for_c(&result))
+    })
+}
+
+/// Sews the garment and lets it come to rest. `desc` NULL takes the defaults; `report` may be NULL.
+/// Stopped by the iteration limit or by the progress callback it is TOILE_OK too, with the outcome
+/// in the report, and may be called again to go on.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_drape(
+    sim: *mut toile_sim,
+    desc: *const toile_drape_desc,
+    report: *mut toile_step_report,
+) -> toile_status {
+    entry!({
+        SIMS.get(sim.addr())?;
+        let desc = desc::read_or_default(desc)?;
+        let options = DrapeOptions {
+            force_tolerance: input::not_negative(desc.force_tolerance, "force_tolerance")?,
+            max_steps: desc.max_steps,
+        };
+        desc::check_target(report, true)?;
+        let result = write(sim, |sim, log| {
+            let result = sim.drape(&options, &mut |progress| go_on(&desc, progress))?;
+            tell(log, "drape", &result);
+            Ok(result)
+        })?;
+        desc::write(report, &report_for_c(&result))
+    })
+}
+
+fn go_on(desc: &toile_drape_desc, progress: &Progress) -> bool {
+    let Some(callback) = desc.progress else {
+        return true;
+    };
+    let stage = c_text(progress.stage);
+    let progress = toile_progress {
+        struct_size: size_of::<toile_progress>(),
+        fraction: progress.fraction,
+        stage: stage.as_ptr(),
+        residual: progress.residual,
+    };
+    callback(desc.progress_user, &raw const progress) == 0
+}
+
+/// The report of the present state without advancing it: counts 0, residual, strain, gaps and
+/// energies as they are.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_report(
+    sim: *const toile_sim,
+    report: *mut toile_step_report,
+) -> toile_status {
+    entry!({
+        let object = SIMS.get(sim.addr())?;
+        desc::check_target(report, false)?;
+        let result = object.read(|object| object.sim.report())?;
+        desc::write(report, &report_for_c(&result))
+    })
+}

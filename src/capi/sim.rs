@@ -1,0 +1,474 @@
+//! Simulations: made, put into a world, edited, saved, restored.
+
+use super::body::BODIES;
+use super::desc;
+use super::garment::{self, GARMENTS};
+use super::guard::{entry, guard};
+use super::handle::Table;
+use super::input::{self, LARGEST_COUNT};
+use super::log::{Log, TOILE_LOG_ERROR, TOILE_LOG_INFO};
+use super::output;
+use super::status::toile_status;
+use super::types::{toile_body, toile_contact_desc, toile_garment, toile_sim, toile_sim_desc};
+use crate::error::{Error, Result};
+use crate::pattern::Garment;
+use crate::sim::{ContactSettings, Settings, Sim, SimOptions};
+use crate::sim_scene;
+use std::ffi::c_char;
+use std::ptr;
+
+/// A simulation and what the boundary keeps beside it.
+pub(super) struct SimObject {
+    pub(super) sim: Sim,
+    log: Log,
+    /// Calls that failed, left the state as it was, but elsewhere in memory.
+    moved: u64,
+}
+
+impl SimObject {
+    /// Changes exactly when views end.
+    pub(super) fn epoch(&self) -> u64 {
+        self.sim.epoch() + self.moved
+    }
+}
+
+pub(super) static SIMS: Table<SimObject> = Table::new(0x73, "simulation");
+
+pub(super) fn read<R>(sim: *const toile_sim, f: impl FnOnce(&Sim) -> Result<R>) -> Result<R> {
+    SIMS.get(sim.addr())?.read(|object| f(&object.sim))
+}
+
+/// Runs a call that may change the simulation; its failure is logged.
+pub(super) fn write<R>(
+    sim: *mut toile_sim,
+    f: impl FnOnce(&mut Sim, &Log) -> Result<R>,
+) -> Result<R> {
+    SIMS.get(sim.addr())?.write(|object| {
+        let log = object.log;
+        let place = |sim: &Sim| (sim.positions().as_ptr(), sim.velocities().as_ptr());
+        let before = place(&object.sim);
+        f(&mut object.sim, &log).inspect_err(|error| {
+            if place(&object.sim) != before {
+                object.moved += 1;
+            }
+            log.say(TOILE_LOG_ERROR, || error.message.clone());
+        })
+    })
+}
+
+/// Number of vertices, asked before arrays of the caller are measured against it.
+fn vertex_count(sim: *const toile_sim) -> Result<usize> {
+    read(sim, |sim| Ok(sim.positions().len()))
+}
+
+fn refuse_regions(garment: &Garment) -> Result<()> {
+    match garment.blend_regions.first() {
+        None => Ok(()),
+        Some(region) => Err(no_yarns(garment, region.panel)),
+    }
+}
+
+fn no_yarns(garment: &Garment, panel: u32) -> Error {
+    let name = garment
+        .panels
+        .get(panel as usize)
+        .map_or("", |p| p.name.as_str());
+    Error::unsupported(format!(
+        "panel {panel} '{name}' asks for a blend region; this version simulates triangles only: \
+         clear the region to simulate the garment without yarns"
+    ))
+}
+
+unsafe fn give(sim: Sim, log: Log, out: *mut *mut toile_sim) -> Result<()> {
+    log.say(TOILE_LOG_INFO, || {
+        let info = sim.info();
+        format!(
+            "{} vertices, {} triangles, {} unknowns, smallest angle {:.1} degrees, {}",
+            info.vertices,
+            info.triangles,
+            info.unknowns,
+            info.min_angle.to_degrees(),
+            info.backend
+        )
+    });
+    let handle = ptr::without_provenance_mut(SIMS.insert(SimObject { sim, log, moved: 0 })?);
+    // SAFETY: checked by the caller.
+    unsafe { output::put(out, handle) };
+    Ok(())
+}
+
+/// Triangulates a garment and makes it ready to move; its vertices stand where the panels are
+/// placed. `desc` NULL takes the defaults. The garment may be changed or freed afterwards. Free the
+/// simulation with toile_sim_free. TOILE_E_GEOMETRY and TOILE_E_LIMIT name the panel;
+/// TOILE_E_UNSUPPORTED: the garment asks for yarns.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_create(
+    garment: *const toile_garment,
+    desc: *const toile_sim_desc,
+    out: *mut *mut toile_sim,
+) -> toile_status {
+    entry!({
+        let garment = GARMENTS.get(garment.addr())?;
+        input::target(out, "out")?;
+        let desc = desc::read_or_default(desc)?;
+        input::reserved(desc.reserved)?;
+        input::finite_all(&desc.gravity, "gravity")?;
+        input::finite_all(&desc.wind, "wind")?;
+        let mut settings = Settings::default();
+        settings.set("solver.threads", f64::from(desc.threads))?;
+        settings.set("limits.vertices", desc.max_vertices as f64)?;
+        let options = SimOptions {
+            gravity: Some(desc.gravity),
+            wind: desc.wind,
+            pressure: input::finite(desc.pressure, "pressure")?,
+            settings,
+        };
+        let log = Log::new(desc.log, desc.log_user);
+        let sim = garment.read(|object| {
+            refuse_regions(&object.garment)?;
+            Sim::new(&object.garment, &options)
+        })?;
+        give(sim, log, out)
+    })
+}
+
+/// Makes a simulation from a scene file: garment, bodies, pins, numbers. `utf8` has `length` bytes;
+/// files named inside are looked for in `base_dir` (UTF-8, ends with NUL; NULL: the working
+/// directory). Free it with toile_sim_free. TOILE_E_PARSE names the key.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_from_scene(
+    utf8: *const c_char,
+    length: usize,
+    base_dir: *const c_char,
+    out: *mut *mut toile_sim,
+) -> toile_status {
+    entry!({
+        input::target(out, "out")?;
+        let text = input::text(utf8, length, "utf8")?;
+        let folder = input::optional_folder(base_dir)?;
+        let (sim, _) = sim_scene::sim_from_json(text, folder.as_deref())?;
+        refuse_regions(sim.garment())?;
+        give(sim, Log::none(), out)
+    })
+}
+
+/// The garment that the simulation was made of, as a new handle; free it with toile_garment_free.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_garment(
+    sim: *const toile_sim,
+    out: *mut *mut toile_garment,
+) -> toile_status {
+    entry!({
+        let object = SIMS.get(sim.addr())?;
+        input::target(out, "out")?;
+        let copy = object.read(|object| Ok(object.sim.garment().clone()))?;
+        output::put(out, garment::insert(copy, Vec::new())?);
+        Ok(())
+    })
+}
+
+/// Puts a body into the world, at the origin until it gets a pose. `contact` NULL takes the
+/// defaults; `out_body`, which may be NULL, gets the body's number. The body may be freed afterwards.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_set_body_sdf(
+    sim: *mut toile_sim,
+    body: *const toile_body,
+    contact: *const toile_contact_desc,
+    out_body: *mut u32,
+) -> toile_status {
+    entry!({
+        SIMS.get(sim.addr())?;
+        let body = BODIES.get(body.addr())?.read(|body| Ok(body.clone()))?;
+        let desc = desc::read_or_default(contact)?;
+        let contact = ContactSettings {
+            friction: input::not_negative(desc.friction, "friction")?,
+            thickness: input::not_negative(desc.thickness, "thickness")?,
+            stiffness: input::positive(desc.stiffness, "stiffness")?,
+        };
+        let number = write(sim, |sim, _| sim.add_body(&body, &contact))?;
+        if !out_body.is_null() {
+            output::put(out_body, number);
+        }
+        Ok(())
+    })
+}
+
+/// Says where a body is to be at the end of the next step: position [m] of its origin and rotation
+/// x, y, z, w. Before the first step: where it is. The cloth feels the velocity that follows.
+///
+/// cbindgen:ptrs-as-arrays=[[position; 3], [quaternion_xyzw; 4]]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_set_body_pose(
+    sim: *mut toile_sim,
+    body: u32,
+    position: *const f64,
+    quaternion_xyzw: *const f64,
+) -> toile_status {
+    entry!({
+        SIMS.get(sim.addr())?;
+        let position = input::numbers::<3>(position, "position")?;
+        let xyzw = input::numbers::<4>(quaternion_xyzw, "quaternion_xyzw")?;
+        let xyzw = input::quaternion(xyzw, "quaternion_xyzw")?;
+        write(sim, |sim, _| sim.set_body_pose(body, position, xyzw))
+    })
+}
+
+/// Says where the vertices of a mesh body are to be at the end of the next step, in the body's
+/// frame [m], shape [vertex_count, 3]. `vertex_count` must be the body's. The cloth feels the
+/// velocities that follow.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_set_body_vertices(
+    sim: *mut toile_sim,
+    body: u32,
+    positions: *const f64,
+    vertex_count: usize,
+) -> toile_status {
+    entry!({
+        let expected = read(sim, |sim| sim.body_mesh(body))?.0.len();
+        input::same_count(vertex_count, expected, "positions")?;
+        let positions = input::points(positions, vertex_count, expected, "positions")?;
+        write(sim, |sim, _| sim.set_body_vertices(body, &positions))
+    })
+}
+
+/// Holds vertices: [count] numbers, targets [m], shape [count, 3], reached at the end of the next
+/// step. `targets` NULL holds them where they are. A vertex that is held already gets the new
+/// target.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_pin(
+    sim: *mut toile_sim,
+    vertices: *const u32,
+    count: usize,
+    targets: *const f64,
+) -> toile_status {
+    entry!({
+        let limit = vertex_count(sim)?;
+        let vertices = input::array(vertices, count, limit, "vertices")?.to_vec();
+        let targets = if targets.is_null() {
+            None
+        } else {
+            Some(input::points::<3>(targets, count, limit, "targets")?)
+        };
+        write(sim, |sim, _| sim.pin(&vertices, targets.as_deref()))
+    })
+}
+
+/// Lets vertices go. TOILE_E_ARGUMENT names one that is not held.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_unpin(
+    sim: *mut toile_sim,
+    vertices: *const u32,
+    count: usize,
+) -> toile_status {
+    entry!({
+        let limit = vertex_count(sim)?;
+        let vertices = input::array(vertices, count, limit, "vertices")?.to_vec();
+        write(sim, |sim, _| sim.unpin(&vertices))
+    })
+}
+
+/// Holds nodes of yarns, as toile_sim_pin holds vertices. TOILE_E_ARGUMENT names a node that does
+/// not exist.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_pin_yarn_nodes(
+    sim: *mut toile_sim,
+    nodes: *const u32,
+    count: usize,
+    targets: *const f64,
+) -> toile_status {
+    entry!({
+        SIMS.get(sim.addr())?;
+        let nodes = input::array(nodes, count, LARGEST_COUNT, "nodes")?;
+        if !targets.is_null() {
+            input::points::<3>(targets, count, LARGEST_COUNT, "targets")?;
+        }
+        // held alone like any call that changes; there is no node that could be held
+        write(sim, |_, _| match nodes.first() {
+            None => Ok(()),
+            Some(node) => Err(Error::argument(format!(
+                "yarn node {node} does not exist: the simulation has 0"
+            ))),
+        })
+    })
+}
+
+/// Moves the region in which every yarn is simulated, with the state carried over: a polygon of a
+/// panel in flat coordinates [m], shape [count, 2], and `rings` hybrid rings around it. A count of 0
+/// takes the region away. TOILE_E_UNSUPPORTED: this version simulates triangles only.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_set_blend_region(
+    sim: *mut toile_sim,
+    panel: u32,
+    uv: *const f64,
+    count: usize,
+    rings: u32,
+) -> toile_status {
+    entry!({
+        SIMS.get(sim.addr())?;
+        let uv = input::points::<2>(uv, count, 1 << 20, "uv")?;
+        write(sim, |sim, _| {
+            let garment = sim.garment();
+            if panel as usize >= garment.panels.len() {
+                return Err(Error::argument(format!(
+                    "panel {panel} does not exist: the garment has {}",
+                    garment.panels.len()
+                )));
+            }
+            if uv.is_empty() {
+                return Ok(());
+            }
+            garment::region(garment, panel, &uv, rings)?;
+            Err(no_yarns(garment, panel))
+        })
+    })
+}
+
+/// Sets a tunable number by its dotted name, the same as in scene files:
+/// "solver.newton.max_iterations", "gravity.x", "wind.z", "pressure". TOILE_E_ARGUMENT names the
+/// range. `toile schema` prints every name with its unit, range and meaning.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_set_number(
+    sim: *mut toile_sim,
+    name: *const c_char,
+    value: f64,
+) -> toile_status {
+    entry!({
+        SIMS.get(sim.addr())?;
+        let name = input::name(name, "name")?.to_owned();
+        let value = input::finite(value, &name)?;
+        write(sim, |sim, _| sim.set_number(&name, value))
+    })
+}
+
+/// Reads what toile_sim_set_number sets.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_number(
+    sim: *const toile_sim,
+    name: *const c_char,
+    out: *mut f64,
+) -> toile_status {
+    entry!({
+        SIMS.get(sim.addr())?;
+        input::target(out, "out")?;
+        let name = input::name(name, "name")?;
+        let value = read(sim, |sim| sim.number(name))?;
+        output::put(out, value);
+        Ok(())
+    })
+}
+
+/// Sets three numbers, or none of them.
+unsafe fn set_vector(
+    sim: *mut toile_sim,
+    what: &str,
+    names: [&str; 3],
+    values: *const f64,
+) -> Result<()> {
+    SIMS.get(sim.addr())?;
+    // SAFETY: handed on.
+    let values = unsafe { input::numbers::<3>(values, what)? };
+    write(sim, |sim, _| {
+        let mut before = [0.0; 3];
+        for (old, name) in before.iter_mut().zip(names) {
+            *old = sim.number(name)?;
+        }
+        for k in 0..3 {
+            if let Err(error) = sim.set_number(names[k], values[k]) {
+                for j in 0..k {
+                    sim.set_number(names[j], before[j])?;
+                }
+                return Err(error);
+            }
+        }
+        Ok(())
+    })
+}
+
+/// Sets the acceleration of gravity [m/s^2].
+///
+/// cbindgen:ptrs-as-arrays=[[gravity; 3]]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_set_gravity(
+    sim: *mut toile_sim,
+    gravity: *const f64,
+) -> toile_status {
+    entry!({
+        set_vector(
+            sim,
+            "gravity",
+            ["gravity.x", "gravity.y", "gravity.z"],
+            gravity,
+        )
+    })
+}
+
+/// Sets the velocity of the air [m/s].
+///
+/// cbindgen:ptrs-as-arrays=[[wind; 3]]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_set_wind(sim: *mut toile_sim, wind: *const f64) -> toile_status {
+    entry!({ set_vector(sim, "wind", ["wind.x", "wind.y", "wind.z"], wind) })
+}
+
+/// Puts every vertex somewhere: positions [m] and velocities [m/s], shape [vertex_count, 3];
+/// `velocities` NULL is at rest. `vertex_count` must be the simulation's.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_set_positions(
+    sim: *mut toile_sim,
+    positions: *const f64,
+    velocities: *const f64,
+    vertex_count: usize,
+) -> toile_status {
+    entry!({
+        let expected = self::vertex_count(sim)?;
+        input::same_count(vertex_count, expected, "positions")?;
+        let x = input::points(positions, vertex_count, expected, "positions")?;
+        let v = if velocities.is_null() {
+            None
+        } else {
+            Some(input::points(
+                velocities,
+                vertex_count,
+                expected,
+                "velocities",
+            )?)
+        };
+        write(sim, |sim, _| sim.set_positions(&x, v.as_deref()))
+    })
+}
+
+/// The state as bytes: everything that the next step depends on. `needed` gets the number of bytes;
+/// `out` NULL asks for it.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_save(
+    sim: *const toile_sim,
+    out: *mut u8,
+    capacity: usize,
+    needed: *mut usize,
+) -> toile_status {
+    entry!({ read(sim, |sim| output::copy(&sim.save()?, out, capacity, needed)) })
+}
+
+/// Restores what toile_sim_save wrote, of a simulation made of the same garment with the same
+/// bodies, in this process or another. The simulation then goes on bit by bit as the saved one did.
+/// TOILE_E_PARSE and TOILE_E_STATE say what does not fit.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_restore(
+    sim: *mut toile_sim,
+    bytes: *const u8,
+    count: usize,
+) -> toile_status {
+    entry!({
+        SIMS.get(sim.addr())?;
+        let bytes = input::array(bytes, count, 1 << 36, "bytes")?;
+        write(sim, |sim, _| sim.restore(bytes))
+    })
+}
+
+/// Frees a simulation; NULL is allowed. Views of it end.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_free(sim: *mut toile_sim) {
+    if !sim.is_null() {
+        guard(|| SIMS.remove(sim.addr()));
+    }
+}

@@ -1,0 +1,142 @@
+//! Every path that a page of the project names exists.
+#![allow(clippy::expect_used, reason = "a test may panic")]
+
+use std::path::Path;
+
+const PAGES: [&str; 4] = [
+    "README.md",
+    "ARCHITECTURE.md",
+    "CONTRIBUTING.md",
+    "CHANGELOG.md",
+];
+/// What the build or a run makes.
+const MADE: [&str; 3] = ["target", "out", "build"];
+/// First parts of paths that belong to the project.
+const TOPS: [&str; 14] = [
+    "src",
+    "tests",
+    "include",
+    "examples",
+    "examples_c",
+    "python",
+    "benches",
+    "fuzz",
+    "scripts",
+    "docs",
+    ".ci",
+    "target",
+    "out",
+    "assets",
+];
+
+/// Text outside of fenced blocks, and the fenced blocks.
+fn parts(text: &str) -> (String, String) {
+    let (mut prose, mut fenced, mut inside) = (String::new(), String::new(), false);
+    for line in text.lines() {
+        if line.trim_start().starts_with("```") {
+            inside = !inside;
+        } else {
+            let part = if inside { &mut fenced } else { &mut prose };
+            part.push_str(line);
+            part.push('\n');
+        }
+    }
+    (prose, fenced)
+}
+
+/// Whether a word is a path of the project: it begins with one of its folders.
+fn is_path(word: &str) -> bool {
+    let top = word.split('/').next().unwrap_or_default();
+    word.contains('/') && TOPS.contains(&top)
+}
+
+/// A word as written in prose or code, without what surrounds it.
+fn bare(word: &str) -> &str {
+    let word = word.trim_start_matches("./");
+    word.trim_matches(|c: char| !(c.is_alphanumeric() || "/_.-*{}".contains(c)))
+        .trim_end_matches(['.', ',', ':'])
+}
+
+/// Paths in a text: words that look like one, `a/{b,c}.rs` spread out.
+fn paths(text: &str) -> Vec<String> {
+    let mut found = Vec::new();
+    for word in text.split(|c: char| c.is_whitespace() || "`()[]\"'=|".contains(c)) {
+        let word = bare(word);
+        if !is_path(word) {
+            continue;
+        }
+        match (word.find('{'), word.find('}')) {
+            (Some(a), Some(b)) if a < b => {
+                for part in word[a + 1..b].split(',') {
+                    found.push(format!("{}{part}{}", &word[..a], &word[b + 1..]));
+                }
+            }
+            _ => found.push(word.to_owned()),
+        }
+    }
+    found
+}
+
+fn is_made(path: &str) -> bool {
+    MADE.contains(&path.split('/').next().unwrap_or_default())
+}
+
+/// Whether a path, which may contain `*`, exists.
+fn exists(root: &Path, path: &str) -> bool {
+    match path.split_once('*') {
+        None => root.join(path).exists(),
+        Some((before, after)) => {
+            let (folder, start) = before.rsplit_once('/').unwrap_or(("", before));
+            std::fs::read_dir(root.join(folder)).is_ok_and(|entries| {
+                entries.flatten().any(|e| {
+                    let name = e.file_name().to_string_lossy().into_owned();
+                    name.starts_with(start) && name.ends_with(after.trim_start_matches('*'))
+                })
+            })
+        }
+    }
+}
+
+#[test]
+fn paths_are_found_in_prose_and_code() {
+    let text = "See `src/sim.rs`, (tests/abi.rs). a/b is none; src/{lib,error}.rs, target/x.";
+    assert_eq!(
+        paths(text),
+        [
+            "src/sim.rs",
+            "tests/abi.rs",
+            "src/lib.rs",
+            "src/error.rs",
+            "target/x"
+        ]
+    );
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    assert!(exists(root, "src/*.rs") && !exists(root, "src/*.c") && !exists(root, "src/none.rs"));
+}
+
+#[test]
+fn every_path_named_in_the_pages_exists() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut missing = Vec::new();
+    let mut count = 0;
+    for page in PAGES {
+        let text = std::fs::read_to_string(root.join(page))
+            .unwrap_or_else(|_| panic!("{page} is missing"));
+        let (prose, fenced) = parts(&text);
+        for path in paths(&prose).into_iter().chain(paths(&fenced)) {
+            count += 1;
+            if !is_made(&path) && !exists(root, &path) {
+                missing.push(format!("{page}: {path}"));
+            }
+        }
+        // links to files beside the page
+        for link in prose.split("](").skip(1) {
+            let target = link.split([')', '#']).next().unwrap_or_default();
+            if !target.is_empty() && !target.contains("://") && !exists(root, target) {
+                missing.push(format!("{page}: link to {target}"));
+            }
+        }
+    }
+    assert!(missing.is_empty(), "{}", missing.join("\n"));
+    assert!(count > 10, "only {count} paths were found");
+}
