@@ -1,5 +1,6 @@
 //! Bending against first principles: cylinders at any angle, the heavy elastica of a clamped strip.
 
+#![allow(clippy::expect_used, reason = "a test may stop here")]
 #![allow(unreachable_pub, reason = "helpers shared by several test files")]
 
 mod sheets;

@@ -1,5 +1,6 @@
 //! Membrane against first principles: uniform strain on any mesh, a sheet that hangs by its weight.
 
+#![allow(clippy::expect_used, reason = "a test may stop here")]
 #![allow(unreachable_pub, reason = "helpers shared by several test files")]
 
 mod sheets;

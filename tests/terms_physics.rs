@@ -1,5 +1,6 @@
 //! What single terms promise in plain mechanics.
 
+#![allow(clippy::expect_used, reason = "a test may stop here")]
 #![allow(unreachable_pub, reason = "helpers shared by several test files")]
 
 mod sheets;
