@@ -1,5 +1,6 @@
 //! Bending against first principles: cylinders at any angle, the heavy elastica of a clamped strip.
 
+#![allow(clippy::expect_used, reason = "a test may stop here")]
 #![allow(unreachable_pub, reason = "helpers shared by several test files")]
 
 mod sheets;
@@ -100,9 +101,10 @@ fn cylinders_cost_what_the_material_says() {
             // nodes forced onto the cylinder are an upper bound; free ones relax (next test)
             let limit = match pattern {
                 Pattern::Squares | Pattern::DiagonalAcross | Pattern::DiagonalAlong => 0.02,
-                Pattern::FairDelaunay => 0.12,
-                Pattern::Delaunay => 0.15,
-                Pattern::UnionJack | Pattern::DiagonalJack => 0.55,
+                Pattern::UnionJack | Pattern::FairDelaunay => 0.02,
+                Pattern::Delaunay => 0.04,
+                // the fabric's axes at 45 degrees to a mesh of two kinds of vertices
+                Pattern::DiagonalJack => 0.45,
             };
             for r in ratios {
                 assert!((r - 1.0).abs() < limit, "{model:?} {pattern:?}: {r}");
@@ -227,9 +229,8 @@ fn cantilever(pattern: Pattern, model: BendingModel, gamma: f64, n: usize, m: us
     let out = statics::relax(&terms, &mut x, &fixed, &world, tolerance, 300);
     assert!(
         out.residual <= tolerance,
-        "{pattern:?} {model:?} {gamma} {n}: residual {} after {}",
-        out.residual,
-        out.iterations
+        "{pattern:?} {model:?} {gamma} {n}: residual {}",
+        out.residual
     );
     let tip: Vec<&Vec3> = x
         .iter()
@@ -271,33 +272,60 @@ fn master(gamma: f64) -> [f64; 2] {
     }
 }
 
+/// Runs all meshes at one load and checks the finest of `sizes` (elements along the strip, whose
+/// width is a sixth of its length): drop within 2 % of itself, tip within 2 % of the length.
+fn check_cantilever(model: BendingModel, gamma: f64, sizes: [usize; 3]) {
+    let want = master(gamma);
+    let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
+    for pattern in PATTERNS {
+        let got = sizes.map(|n| cantilever(pattern, model, gamma, n, n / 6));
+        let drop = got.map(|g| g[1] / want[1] - 1.0);
+        let reach = got.map(|g| g[0] / want[0] - 1.0);
+        let tip = got.map(|g| (g[0] - want[0]).hypot(g[1] - want[1]));
+        let order = (tip[1] / tip[2]).log2();
+        println!(
+            "Gamma {gamma:4} {model:9?} {pattern:14?} drop {drop:+.4?} reach {reach:+.4?} tip/L {tip:.4?} order {order:.1}"
+        );
+        // two kinds of vertices with their links at 45 degrees to the fold: the hardest of lattices
+        let limit = if pattern == Pattern::DiagonalJack {
+            0.03
+        } else {
+            0.02
+        };
+        assert!(drop[2].abs() < limit, "{pattern:?}: drop {drop:?}");
+        assert!(tip[2] < 0.02, "{pattern:?}: tip {tip:?}");
+        // irregular meshes keep an error of some tenths of a percent
+        assert!(
+            tip[2] < tip[0] || tip[2] < 0.003,
+            "{pattern:?} does not converge: {tip:?}"
+        );
+        least = least.min(drop[2]);
+        most = most.max(drop[2]);
+    }
+    println!(
+        "Gamma {gamma:4} {model:9?} spread of the drop over meshes {:.4}",
+        most - least
+    );
+}
+
 #[test]
-fn a_heavy_strip_follows_the_elastica_on_every_mesh() {
+fn a_heavy_strip_with_hinges_follows_the_elastica_on_every_mesh() {
     for gamma in [1.0, 10.0, 100.0, 1000.0] {
-        let want = master(gamma);
-        for model in [BendingModel::Hinge, BendingModel::Quadratic] {
-            for pattern in PATTERNS {
-                let start = std::time::Instant::now();
-                let errors = [40, 80, 160].map(|n| {
-                    let got = cantilever(pattern, model, gamma, n, 6);
-                    // the larger of drop and reach, each over its own size
-                    let e = [0, 1].map(|c| got[c] / want[c] - 1.0);
-                    (e[0], e[1])
-                });
-                let last = errors[2];
-                let worst = |e: (f64, f64)| e.0.abs().max(e.1.abs());
-                let order = (worst(errors[1]) / worst(last)).log2();
-                println!(
-                    "Gamma {gamma:6} {model:9?} {pattern:14?} reach {:+.4} {:+.4} {:+.4}, drop {:+.4} {:+.4} {:+.4}, order {order:.1} ({:.1} s)",
-                    errors[0].0,
-                    errors[1].0,
-                    last.0,
-                    errors[0].1,
-                    errors[1].1,
-                    last.1,
-                    start.elapsed().as_secs_f64()
-                );
-            }
-        }
+        check_cantilever(BendingModel::Hinge, gamma, [24, 48, 96]);
+    }
+}
+
+#[test]
+fn a_heavy_strip_with_quadratic_bending_follows_the_elastica_on_every_mesh() {
+    for gamma in [10.0, 1000.0] {
+        check_cantilever(BendingModel::Quadratic, gamma, [24, 48, 96]);
+    }
+}
+
+#[test]
+#[ignore = "a minute: the table at a finer mesh"]
+fn a_heavy_strip_at_a_finer_mesh() {
+    for gamma in [1.0, 1000.0] {
+        check_cantilever(BendingModel::Hinge, gamma, [48, 96, 192]);
     }
 }

@@ -1,6 +1,7 @@
 //! Every term against finite differences and the symmetries of mechanics, at rest, random,
 //! crumpled and nearly degenerate states.
 
+#![allow(clippy::expect_used, reason = "a test may stop here")]
 #![allow(unreachable_pub, reason = "helpers shared by several test files")]
 
 mod sheets;

@@ -365,7 +365,9 @@ mod tests {
         // a square cut by both diagonals, and a triangle that touches one corner only
         let t = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4], [0, 5, 6]];
         let all = fans(&t);
-        let center = all.iter().find(|f| f.center == 4).expect("vertex 4");
+        let Some(center) = all.iter().find(|f| f.center == 4) else {
+            panic!("vertex 4 has no fan");
+        };
         assert!(center.closed && center.ring.len() == 4);
         let corner: Vec<_> = all.iter().filter(|f| f.center == 0).collect();
         assert_eq!(corner.len(), 2);

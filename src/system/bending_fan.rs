@@ -31,6 +31,11 @@
 //! diagonals, so that the stiffness depends on the mesh whatever its fineness. Summing before
 //! squaring removes the cross terms.
 //!
+//! Limits, measured on clamped strips: second order on squares; on irregular meshes a stiffness error
+//! stays, 0.2 % for a grid jittered by 15 % of an edge, 0.7 % for 30 %, 2 % for squares at 45 degrees
+//! to the fold with alternating diagonals; at a border that cuts the mesh unevenly first order in
+//! the edge length over the width.
+//!
 //! A fan with more neighbours than a stencil holds is cut into shorter ones with `W = D / A`.
 
 use super::membrane::material_rotation;

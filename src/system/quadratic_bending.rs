@@ -57,35 +57,19 @@ impl QuadraticBending {
         &self.stiffness[n * e..][..n]
     }
 
+    /// `R` of the field `y`, relative to the centre so that it does not cancel far from the origin.
+    fn bend(&self, e: usize, y: impl Fn(usize) -> Vec3) -> Mat3 {
+        let v = self.vertices(e);
+        let origin = y(v[0] as usize);
+        let mut r = Mat3::zeros();
+        for (b, &v) in self.group.fans[e].measure.operator.iter().zip(v).skip(1) {
+            r += b * (y(v as usize) - origin).transpose();
+        }
+        r
+    }
+
     fn vertices(&self, e: usize) -> &[u32] {
         &self.group.vertices[self.group.arity * e..][..self.group.arity]
-    }
-}
-
-/// `1/2 sum_ij K_ij y_i . y_j`.
-fn quadratic_form(k: &[f64], y: impl Fn(usize) -> Vec3, arity: usize) -> f64 {
-    let mut sum = 0.0;
-    for i in 0..arity {
-        let yi = y(i);
-        let row = &k[i * (i + 1) / 2..][..i + 1];
-        for (j, kij) in row.iter().enumerate().take(i) {
-            sum += kij * yi.dot(&y(j));
-        }
-        sum += 0.5 * row[i] * yi.norm_squared();
-    }
-    sum
-}
-
-/// `out += factor K y`.
-fn product(k: &[f64], y: impl Fn(usize) -> Vec3, factor: f64, out: &mut [Vec3]) {
-    for i in 0..out.len() {
-        let yi = y(i) * factor;
-        let row = &k[i * (i + 1) / 2..][..i + 1];
-        for (j, kij) in row.iter().enumerate().take(i) {
-            out[i] += y(j) * (factor * kij);
-            out[j] += yi * *kij;
-        }
-        out[i] += yi * row[i];
     }
 }
 
@@ -102,29 +86,26 @@ impl Term for QuadraticBending {
     }
 
     fn value(&self, e: usize, at: &Configuration<'_>) -> f64 {
-        let (k, v) = (self.stiffness(e), self.vertices(e));
-        let rate = self.group.fans[e].damping * at.inv_dt;
-        // relative to the centre, so that the sum does not cancel far from the origin
-        let origin = at.x[v[0] as usize];
-        let mut energy = quadratic_form(k, |i| at.x[v[i] as usize] - origin, v.len());
+        let fan = &self.group.fans[e];
+        let energy = |r: &Mat3| 0.5 * r.dot(&(fan.stiffness * r));
+        let rate = fan.damping * at.inv_dt;
+        let mut sum = energy(&self.bend(e, |v| at.x[v]));
         if rate > 0.0 {
-            let moved = |i: usize| at.x[v[i] as usize] - at.x0[v[i] as usize];
-            let first = moved(0);
-            energy += rate * quadratic_form(k, |i| moved(i) - first, v.len());
+            sum += rate * energy(&self.bend(e, |v| at.x[v] - at.x0[v]));
         }
-        energy
+        sum
     }
 
     fn gradient(&self, e: usize, at: &Configuration<'_>, out: &mut [Vec3]) {
-        let (k, v) = (self.stiffness(e), self.vertices(e));
-        let rate = self.group.fans[e].damping * at.inv_dt;
-        let origin = at.x[v[0] as usize];
-        out.fill(Vec3::zeros());
-        product(k, |i| at.x[v[i] as usize] - origin, 1.0, out);
+        let fan = &self.group.fans[e];
+        let rate = fan.damping * at.inv_dt;
+        let mut r = self.bend(e, |v| at.x[v]);
         if rate > 0.0 {
-            let moved = |i: usize| at.x[v[i] as usize] - at.x0[v[i] as usize];
-            let first = moved(0);
-            product(k, |i| moved(i) - first, rate, out);
+            r += self.bend(e, |v| at.x[v] - at.x0[v]) * rate;
+        }
+        let moment = fan.stiffness * r;
+        for (o, b) in out.iter_mut().zip(&fan.measure.operator) {
+            *o = moment.tr_mul(b);
         }
     }
 

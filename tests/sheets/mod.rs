@@ -107,7 +107,7 @@ pub fn rectangle(pattern: Pattern, length: f64, width: f64, n: usize) -> Flat {
             let is_across = |i: usize| match pattern {
                 Pattern::DiagonalAcross => true,
                 Pattern::DiagonalAlong => false,
-                _ => i % 2 == 0,
+                _ => i.is_multiple_of(2),
             };
             for j in 0..=ny {
                 for i in 0..=nx {

@@ -11,7 +11,6 @@ use toile::system::term::{Configuration, HessianKind, MAX_ARITY, MAX_BLOCKS, Ter
 
 pub struct Outcome {
     pub residual: f64,
-    pub iterations: usize,
 }
 
 pub fn energy(terms: &[Box<dyn Term>], x: &[Vec3], world: &World<'_>) -> f64 {
@@ -172,7 +171,7 @@ pub fn relax(
     let mut now = energy(terms, x, world);
     let mut shift = 0.0;
     let mut residual = f64::INFINITY;
-    for iteration in 0..limit {
+    for _ in 0..limit {
         let mut g = gradient(terms, x, world);
         for (g, f) in g.iter_mut().zip(fixed) {
             if *f {
@@ -181,10 +180,7 @@ pub fn relax(
         }
         residual = g.iter().map(|g| g.amax()).fold(0.0, f64::max);
         if residual < tolerance {
-            return Outcome {
-                residual,
-                iterations: iteration,
-            };
+            return Outcome { residual };
         }
         let step = [HessianKind::Exact, HessianKind::Psd]
             .into_iter()
@@ -204,7 +200,7 @@ pub fn relax(
         let accepted = (0..30).any(|_| {
             let tried: Vec<Vec3> = x.iter().zip(&step).map(|(x, s)| x - s * length).collect();
             let then = energy(terms, &tried, world);
-            let rounding = 1e-13 * now.abs();
+            let rounding = 1e-12 * now.abs();
             if then <= now - 1e-4 * length * slope + rounding {
                 *x = tried;
                 now = then;
@@ -223,8 +219,5 @@ pub fn relax(
             break;
         }
     }
-    Outcome {
-        residual,
-        iterations: limit,
-    }
+    Outcome { residual }
 }
