@@ -45,7 +45,7 @@ fn load(path: &Path, scale: f64) -> (Vec<Vec3>, Vec<[u32; 3]>) {
 }
 
 #[test]
-fn shirt_on_body_is_drawn_in_two_seconds_with_both_colours_in_it() {
+fn shirt_on_body_is_drawn_with_both_colours_in_it() {
     let Some(data) = data() else { return };
     for body in ["mean_all.obj", "makehuman_body_closed_m.obj"] {
         let (x, t) = load(&data.join("bodies").join(body), 1.0);
