@@ -17,7 +17,10 @@ fn scene(n: usize) -> Sim {
     for p in &mut mesh.placed {
         *p = Vec3::new(p.x - 0.5, 0.35, p.y - 0.5);
     }
-    let fabric = Fabric { density: 0.2, ..Fabric::default() };
+    let fabric = Fabric {
+        density: 0.2,
+        ..Fabric::default()
+    };
     let garment = Garment {
         fabrics: vec![fabric],
         edge_length: 0.02,
@@ -26,10 +29,16 @@ fn scene(n: usize) -> Sim {
     };
     let mut settings = Settings::default();
     settings.self_contact = 0.0;
-    let options = SimOptions { settings, ..SimOptions::default() };
+    let options = SimOptions {
+        settings,
+        ..SimOptions::default()
+    };
     let mut sim = Sim::from_mesh(&garment, mesh, &options).expect("scene");
     let body = Body::sphere(0.3).expect("sphere");
-    let contact = ContactSettings { friction: 0.3, ..ContactSettings::default() };
+    let contact = ContactSettings {
+        friction: 0.3,
+        ..ContactSettings::default()
+    };
     sim.add_body(&body, &contact).expect("body");
     sim
 }
@@ -46,7 +55,13 @@ fn run(n: usize, duration: f64, dt: f64) -> Run {
     let mut sim = scene(n);
     let steps = (duration / dt).round() as usize;
     let clock = Instant::now();
-    let mut out = Run { cpu: 0.0, strain: 0.0, newton: 0, substeps: 0, at_one: Vec::new() };
+    let mut out = Run {
+        cpu: 0.0,
+        strain: 0.0,
+        newton: 0,
+        substeps: 0,
+        at_one: Vec::new(),
+    };
     for k in 1..=steps {
         let report = sim.step(dt).expect("step");
         out.strain = out.strain.max(report.max_edge_strain);
@@ -61,12 +76,21 @@ fn run(n: usize, duration: f64, dt: f64) -> Run {
 }
 
 fn rms(a: &[Vec3], b: &[Vec3]) -> f64 {
-    (a.iter().zip(b).map(|(p, q)| (p - q).norm_squared()).sum::<f64>() / a.len() as f64).sqrt()
+    (a.iter()
+        .zip(b)
+        .map(|(p, q)| (p - q).norm_squared())
+        .sum::<f64>()
+        / a.len() as f64)
+        .sqrt()
 }
 
 fn main() {
     let quick = std::env::args().any(|a| a == "--quick");
-    let cases: &[(usize, f64)] = if quick { &[(40, 1.0)] } else { &[(40, 2.0), (100, 1.0)] };
+    let cases: &[(usize, f64)] = if quick {
+        &[(40, 1.0)]
+    } else {
+        &[(40, 2.0), (100, 1.0)]
+    };
     println!("  grid      dt   s per s   strain %   RMS to dt 0.5 ms [mm]   newton  substeps");
     for &(n, duration) in cases {
         let reference = run(n, 1.0, 5e-4);

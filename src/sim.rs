@@ -8,16 +8,16 @@ use crate::pattern::Garment;
 use crate::readout::surface;
 use crate::solve::drape;
 use crate::solve::engine::Engine;
+pub use crate::solve::report::{Energies, Outcome, StepReport};
+pub use crate::solve::settings::Settings;
 use crate::solve::step::{self, Totals};
 use crate::system::bodies::check_index;
 use crate::system::build::{BuildOptions, System};
 use crate::system::snapshot;
 use crate::system::state::{Pin, State};
+pub use crate::system::term::ContactSettings;
 use crate::tri::GarmentMesh;
 use std::sync::{Mutex, MutexGuard, PoisonError};
-pub use crate::solve::report::{Energies, Outcome, StepReport};
-pub use crate::solve::settings::Settings;
-pub use crate::system::term::ContactSettings;
 
 /// What a simulation is created with besides the garment.
 #[derive(Clone, Debug, Default)]
@@ -183,7 +183,10 @@ impl Sim {
         let rotation = Rotation::try_new(quaternion, 1e-12).ok_or_else(|| {
             Error::argument(format!("body {b}: quaternion {xyzw:?} has no length"))
         })?;
-        let pose = Pose { position: Vec3::from(position), rotation };
+        let pose = Pose {
+            position: Vec3::from(position),
+            rotation,
+        };
         let state = &mut self.state.bodies[b];
         state.target = pose;
         if !state.moved_with_time {
@@ -198,7 +201,9 @@ impl Sim {
         let b = check_index(body, self.bodies.len())?;
         let count = self.bodies[b].0.vertices().len();
         if count == 0 {
-            return Err(Error::unsupported(format!("body {b} is not a mesh and cannot deform")));
+            return Err(Error::unsupported(format!(
+                "body {b} is not a mesh and cannot deform"
+            )));
         }
         if positions.len() != count {
             return Err(Error::argument(format!(
@@ -245,8 +250,9 @@ impl Sim {
             }
         }
         for (k, &vertex) in vertices.iter().enumerate() {
-            let target = targets
-                .map_or(self.state.positions[vertex as usize], |targets| Vec3::from(targets[k]));
+            let target = targets.map_or(self.state.positions[vertex as usize], |targets| {
+                Vec3::from(targets[k])
+            });
             match self.state.pins.binary_search_by_key(&vertex, |p| p.vertex) {
                 Ok(i) => self.state.pins[i].target = target,
                 Err(i) => self.state.pins.insert(i, Pin { vertex, target }),
@@ -259,7 +265,12 @@ impl Sim {
     /// Lets vertices go; one that is not pinned is refused.
     pub fn unpin(&mut self, vertices: &[u32]) -> Result<()> {
         self.check_vertices(vertices)?;
-        let pinned = |v: &u32| self.state.pins.binary_search_by_key(v, |p| p.vertex).is_ok();
+        let pinned = |v: &u32| {
+            self.state
+                .pins
+                .binary_search_by_key(v, |p| p.vertex)
+                .is_ok()
+        };
         if let Some(v) = vertices.iter().find(|v| !pinned(v)) {
             return Err(Error::argument(format!("vertex {v} is not pinned")));
         }
@@ -271,9 +282,9 @@ impl Sim {
     fn check_vertices(&self, vertices: &[u32]) -> Result<()> {
         let n = self.state.positions.len();
         match vertices.iter().find(|&&v| v as usize >= n) {
-            Some(v) => {
-                Err(Error::argument(format!("vertex {v} does not exist; there are {n} vertices")))
-            }
+            Some(v) => Err(Error::argument(format!(
+                "vertex {v} does not exist; there are {n} vertices"
+            ))),
             None => Ok(()),
         }
     }
@@ -301,12 +312,18 @@ impl Sim {
     /// Advances by exactly `dt` [s], or returns the state untouched.
     pub fn step(&mut self, dt: f64) -> Result<StepReport> {
         if !(dt.is_finite() && dt > 0.0 && dt <= 1e6) {
-            return Err(Error::argument(format!("dt = {dt} s must be positive and at most 1e6")));
+            return Err(Error::argument(format!(
+                "dt = {dt} s must be positive and at most 1e6"
+            )));
         }
         let saved = self.state.clone();
         let mut engine = self.engine.lock().unwrap_or_else(PoisonError::into_inner);
         let done = step::step(&mut engine, &mut self.state, dt).and_then(|totals| {
-            let outcome = if totals.cut { Outcome::Substepped } else { Outcome::Converged };
+            let outcome = if totals.cut {
+                Outcome::Substepped
+            } else {
+                Outcome::Converged
+            };
             describe(&mut engine, &self.state, &totals, outcome, dt)
         });
         drop(engine);
@@ -350,7 +367,11 @@ impl Sim {
         };
         let saved = self.state.clone();
         let flat = self.state.positions == self.mesh.placed;
-        let levels = if flat { self.coarse_levels()? } else { Vec::new() };
+        let levels = if flat {
+            self.coarse_levels()?
+        } else {
+            Vec::new()
+        };
         for body in &mut self.state.bodies {
             body.pose = body.target;
             if !body.target_vertices.is_empty() {
@@ -358,9 +379,20 @@ impl Sim {
             }
         }
         let mut engine = self.engine.lock().unwrap_or_else(PoisonError::into_inner);
-        let done = drape::drape(&mut engine, &mut self.state, levels, flat, &plan, &mut |f, s, r| {
-            progress(&Progress { fraction: f, stage: s, residual: r })
-        })
+        let done = drape::drape(
+            &mut engine,
+            &mut self.state,
+            levels,
+            flat,
+            &plan,
+            &mut |f, s, r| {
+                progress(&Progress {
+                    fraction: f,
+                    stage: s,
+                    residual: r,
+                })
+            },
+        )
         .and_then(|relaxed| {
             let outcome = if relaxed.cancelled {
                 Outcome::Cancelled
@@ -402,7 +434,9 @@ impl Sim {
             for (body, contact) in &self.bodies {
                 let _ = system.bodies.add(body, contact);
             }
-            levels.push(drape::Level { engine: Engine::new(system, &self.settings) });
+            levels.push(drape::Level {
+                engine: Engine::new(system, &self.settings),
+            });
         }
         Ok(levels)
     }
@@ -432,7 +466,10 @@ impl Sim {
     pub fn set_positions(&mut self, x: &[[f64; 3]], v: Option<&[[f64; 3]]>) -> Result<()> {
         let n = self.state.positions.len();
         if x.len() != n || v.is_some_and(|v| v.len() != n) {
-            return Err(Error::argument(format!("{n} vertices, not {}, are expected", x.len())));
+            return Err(Error::argument(format!(
+                "{n} vertices, not {}, are expected",
+                x.len()
+            )));
         }
         let x: Vec<Vec3> = x.iter().map(|p| Vec3::from(*p)).collect();
         let v: Vec<Vec3> = v.map_or_else(
@@ -482,7 +519,10 @@ impl Sim {
 
     /// Energies of the present state.
     pub fn energies(&self) -> Result<Energies> {
-        let mut out = Energies { kinetic: self.kinetic_energy(), ..Energies::default() };
+        let mut out = Energies {
+            kinetic: self.kinetic_energy(),
+            ..Energies::default()
+        };
         for (name, value) in self.engine().energies(&self.state)? {
             match name {
                 "gravity" => out.gravity += value,
@@ -503,7 +543,13 @@ impl Sim {
     /// Numbers of the present state without advancing it (counts are zero).
     pub fn report(&self) -> Result<StepReport> {
         let mut engine = self.engine();
-        describe(&mut engine, &self.state, &Totals::default(), Outcome::Converged, 0.0)
+        describe(
+            &mut engine,
+            &self.state,
+            &Totals::default(),
+            Outcome::Converged,
+            0.0,
+        )
     }
 
     /// The state as bytes.
@@ -612,7 +658,12 @@ fn describe(
 }
 
 fn kinetic_energy(state: &State, masses: &[f64]) -> f64 {
-    state.velocities.iter().zip(masses).map(|(v, m)| 0.5 * m * v.norm_squared()).sum()
+    state
+        .velocities
+        .iter()
+        .zip(masses)
+        .map(|(v, m)| 0.5 * m * v.norm_squared())
+        .sum()
 }
 
 fn world_number<'a>(state: &'a mut State, name: &str) -> Option<&'a mut f64> {
@@ -637,7 +688,10 @@ fn finite(what: &str, values: &[f64]) -> Result<()> {
 
 fn finite_points(what: &str, points: &[Vec3]) -> Result<()> {
     match points.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
-        Some(i) => Err(Error::argument(format!("{what} {i} = {:?} must be finite", points[i]))),
+        Some(i) => Err(Error::argument(format!(
+            "{what} {i} = {:?} must be finite",
+            points[i]
+        ))),
         None => Ok(()),
     }
 }

@@ -2,9 +2,9 @@
 //! block-sparse matrices, deterministic parallel loops, finite differences.
 
 pub mod block;
+pub mod boxtree;
 pub mod diff;
 pub mod geometry;
-pub mod boxtree;
 pub mod parallel;
 pub mod spd;
 

@@ -7,7 +7,7 @@
 //! static problem.
 
 use super::engine::{Attempt, Engine, Motion};
-use super::step::Totals;
+use super::step::{Totals, step};
 use crate::error::{Error, Result, Status};
 use crate::math::Vec3;
 use crate::system::state::{Pin, State};
@@ -42,6 +42,11 @@ pub struct Relaxed {
 /// Smallest step of a relaxation before it gives up [s].
 const SMALLEST_STEP: f64 = 1e-6;
 
+/// Friction is frozen below this many force tolerances.
+const FREEZE: f64 = 300.0;
+/// Steps after which friction follows only every tenth step.
+const SETTLED: u64 = 200;
+
 /// Relaxes the state towards rest. `watch(step, residual)` returns false to stop.
 pub fn relax(
     engine: &mut Engine,
@@ -49,12 +54,25 @@ pub fn relax(
     options: &RelaxOptions,
     watch: &mut dyn FnMut(u64, f64) -> bool,
 ) -> Result<Relaxed> {
-    let mut out = Relaxed { totals: Totals::default(), converged: false, cancelled: false };
+    let mut out = Relaxed {
+        totals: Totals::default(),
+        converged: false,
+        cancelled: false,
+    };
+    out.totals.residual = f64::INFINITY;
     let mut h = options.first_step;
     let mut kinetic = [0.0; 2];
+    // the exact Hessian pays near rest: it is tried after full steps, less often where it failed
+    let (mut wait, mut patience) = (4_u32, 4_u32);
     state.velocities.fill(Vec3::zeros());
     while out.totals.substeps < options.max_steps {
-        let (summary, reason) = match engine.attempt(state, h, 1.0, Motion::Relax) {
+        let exact = wait == 0;
+        // near rest friction is frozen while Newton's method converges: anchors that move after
+        // every correction would creep
+        let follow = out.totals.residual > FREEZE * options.force_tolerance
+            && (out.totals.substeps < SETTLED || out.totals.substeps.is_multiple_of(10));
+        let (summary, reason) = match engine.attempt(state, h, 1.0, Motion::Relax { exact, follow })
+        {
             Ok(Attempt::Accepted(summary)) => (summary, None),
             Ok(Attempt::Rejected(reason, summary)) => (summary, Some(reason.to_owned())),
             Err(e) if matches!(e.status, Status::NoAdmissibleState | Status::LinearSolve) => {
@@ -64,6 +82,20 @@ pub fn relax(
         };
         out.totals.newton_iterations += u64::from(summary.iterations);
         out.totals.linear_iterations += summary.linear_iterations;
+        if exact && !summary.exact {
+            patience = (2 * patience).min(64);
+        } else if summary.exact {
+            patience = 1;
+        }
+        wait = if summary.last_length < 1.0 {
+            patience
+        } else if summary.exact {
+            0
+        } else if exact {
+            patience
+        } else {
+            wait.saturating_sub(1)
+        };
         if let Some(reason) = reason {
             out.totals.cut = true;
             state.velocities.fill(Vec3::zeros());
@@ -94,19 +126,19 @@ pub fn relax(
         } else if summary.last_length < 0.3 {
             h *= 0.6;
         }
-        if summary.static_residual <= options.force_tolerance && summary.iterations == 0
-            || (options.seam_gap > 0.0
-                && engine.system.largest_seam_gap(&state.positions) <= options.seam_gap)
+        if options.seam_gap > 0.0
+            && engine.system.largest_seam_gap(&state.positions) <= options.seam_gap
         {
             out.converged = true;
             return Ok(out);
         }
-        if summary.static_residual <= options.force_tolerance
-            && engine.residual(state)? <= options.force_tolerance
-        {
+        if summary.static_residual <= options.force_tolerance {
+            engine.follow(state)?;
             out.totals.residual = engine.residual(state)?;
-            out.converged = true;
-            return Ok(out);
+            if out.totals.residual <= options.force_tolerance {
+                out.converged = true;
+                return Ok(out);
+            }
         }
         if !watch(out.totals.substeps, summary.static_residual) {
             out.cancelled = true;
@@ -145,6 +177,15 @@ const SEW: (f64, f64) = (0.0, 0.25);
 const SETTLE: (f64, f64) = (0.25, 0.6);
 const REST: (f64, f64) = (0.6, 1.0);
 
+/// Rounds of Newton's method and a moment of motion that a drape may take.
+const ROUNDS: usize = 4;
+/// Largest motion of a garment at rest [m].
+const STILL: f64 = 1e-4;
+/// Step of the moment of motion [s], its largest number, and how many quiet ones end it.
+const PROBE_STEP: f64 = 1.0 / 30.0;
+const PROBE_STEPS: usize = 30;
+const QUIET_STEPS: usize = 4;
+
 /// A gap at which the seams count as closed [m].
 const CLOSED: f64 = 1e-3;
 
@@ -160,7 +201,11 @@ pub fn drape(
     plan: &Plan,
     watch: &mut Watch<'_>,
 ) -> Result<Relaxed> {
-    let mut all = Relaxed { totals: Totals::default(), converged: false, cancelled: false };
+    let mut all = Relaxed {
+        totals: Totals::default(),
+        converged: false,
+        cancelled: false,
+    };
     let mut carried: Option<(Engine, State)> = None;
     for level in levels {
         let mut coarse = level.engine;
@@ -174,7 +219,15 @@ pub fn drape(
             }
         }
         let options = settle_options(plan, 100.0 * plan.force_tolerance);
-        let done = stage(&mut coarse, &mut coarse_state, &options, SETTLE, "settle", &mut all, watch)?;
+        let done = stage(
+            &mut coarse,
+            &mut coarse_state,
+            &options,
+            SETTLE,
+            "settle",
+            &mut all,
+            watch,
+        )?;
         if done.cancelled {
             return Ok(all);
         }
@@ -190,10 +243,68 @@ pub fn drape(
         None => {}
     }
     let options = settle_options(plan, plan.force_tolerance);
-    let done = stage(engine, state, &options, REST, "rest", &mut all, watch)?;
-    all.converged = done.converged;
+    for round in 0..ROUNDS {
+        let done = stage(engine, state, &options, REST, "rest", &mut all, watch)?;
+        all.converged = done.converged;
+        if !done.converged || done.cancelled || round + 1 == ROUNDS {
+            break;
+        }
+        // Newton's method may stop at an equilibrium that the least motion leaves
+        let rested = state.positions.clone();
+        let probed = probe(engine, state, &mut all)?;
+        let moved = state
+            .positions
+            .iter()
+            .zip(&rested)
+            .map(|(p, q)| (p - q).norm());
+        if !probed || moved.fold(0.0, f64::max) < STILL {
+            break;
+        }
+    }
     state.velocities.fill(Vec3::zeros());
     Ok(all)
+}
+
+/// Lets the garment move for a moment, without advancing time. False if no step could be taken.
+fn probe(engine: &mut Engine, state: &mut State, all: &mut Relaxed) -> Result<bool> {
+    let before = state.clone();
+    state.velocities.fill(Vec3::zeros());
+    let mut quiet = 0;
+    for _ in 0..PROBE_STEPS {
+        let start = state.positions.clone();
+        match step(engine, state, PROBE_STEP) {
+            Ok(totals) => {
+                all.totals.newton_iterations += totals.newton_iterations;
+                all.totals.linear_iterations += totals.linear_iterations;
+                all.totals.substeps += totals.substeps;
+            }
+            Err(e) if e.status == Status::NoAdmissibleState => {
+                *state = before;
+                return Ok(false);
+            }
+            Err(e) => return Err(e),
+        }
+        let moved = state
+            .positions
+            .iter()
+            .zip(&start)
+            .map(|(p, q)| (p - q).norm());
+        quiet = if moved.fold(0.0, f64::max) < 0.1 * STILL {
+            quiet + 1
+        } else {
+            0
+        };
+        if quiet >= QUIET_STEPS {
+            break;
+        }
+    }
+    state.velocities.fill(Vec3::zeros());
+    state.time = before.time;
+    state.step_size = before.step_size;
+    for (body, old) in state.bodies.iter_mut().zip(&before.bodies) {
+        body.moved_with_time = old.moved_with_time;
+    }
+    Ok(true)
 }
 
 fn settle_options(plan: &Plan, force_tolerance: f64) -> RelaxOptions {

@@ -43,7 +43,12 @@ pub enum Motion {
     /// Backward Euler.
     Dynamic,
     /// Towards rest by one semi-implicit step: one Newton correction, rate terms off.
-    Relax,
+    Relax {
+        /// Whether the exact Hessian is tried.
+        exact: bool,
+        /// Whether friction anchors and normal forces follow the step.
+        follow: bool,
+    },
 }
 
 impl Engine {
@@ -76,7 +81,8 @@ impl Engine {
         }
         self.system.set_options(&settings.into())?;
         self.settings = settings.clone();
-        self.assembler.rebuild(self.system.cloth.mesh.uv.len(), &self.system.terms);
+        self.assembler
+            .rebuild(self.system.cloth.mesh.uv.len(), &self.system.terms);
         Ok(())
     }
 
@@ -138,7 +144,12 @@ impl Engine {
             bodies: &system.bodies,
         };
         {
-            let at = Configuration { x: &self.start, x0: &self.start, inv_dt, world: &world };
+            let at = Configuration {
+                x: &self.start,
+                x0: &self.start,
+                inv_dt,
+                world: &world,
+            };
             let mut changed = false;
             for term in &mut system.terms {
                 changed |= term.begin_step(state, &at);
@@ -152,18 +163,26 @@ impl Engine {
             world: &world,
             x0: &self.start,
             inv_dt,
-            inertia: Inertia { weight: &self.weight, center: &self.center },
+            inertia: Inertia {
+                weight: &self.weight,
+                center: &self.center,
+            },
             fixed: &self.fixed,
             workers: &self.workers,
         };
         let tolerance = Tolerance {
-            displacement: if dynamic { self.settings.newton_velocity_tolerance * h } else { 0.0 },
+            displacement: if dynamic {
+                self.settings.newton_velocity_tolerance * h
+            } else {
+                0.0
+            },
             force: 0.0,
             iterations: match motion {
                 Motion::Dynamic => self.settings.newton_max_iterations as u32,
-                Motion::Relax => 1,
+                Motion::Relax { .. } => 1,
             },
             linear: self.settings.linear_tolerance,
+            exact: matches!(motion, Motion::Relax { exact: true, .. }),
         };
         let summary = problem.minimise(
             &mut x,
@@ -177,25 +196,44 @@ impl Engine {
         } else if !dynamic && summary.last_length == 0.0 {
             Some("the line search found no decrease")
         } else {
-            let at = Configuration { x: &x, x0: &self.start, inv_dt, world: &world };
+            let at = Configuration {
+                x: &x,
+                x0: &self.start,
+                inv_dt,
+                world: &world,
+            };
             inadmissible(system, &at, dynamic)
         };
         if let Some(reason) = refused {
             return Ok(Attempt::Rejected(reason, summary));
         }
-        let at = Configuration { x: &x, x0: &self.start, inv_dt, world: &world };
-        // accept: lagged data first, while the step's configuration stands
-        let mut terms = std::mem::take(&mut system.terms);
-        for term in &mut terms {
-            term.accept(&at, state);
+        let at = Configuration {
+            x: &x,
+            x0: &self.start,
+            inv_dt,
+            world: &world,
+        };
+        if !matches!(motion, Motion::Relax { follow: false, .. }) {
+            for term in &mut system.terms {
+                term.accept(&at, state);
+            }
         }
-        system.terms = terms;
         for i in 0..n {
             state.velocities[i] = (x[i] - self.start[i]) / h;
         }
         state.positions = x;
         system.bodies.accept(state);
         Ok(Attempt::Accepted(summary))
+    }
+
+    /// Lets friction anchors and normal forces follow the present state.
+    pub fn follow(&mut self, state: &mut State) -> Result<()> {
+        let still = state.clone();
+        self.with_present(&still, |engine, at| {
+            for term in &mut engine.system.terms {
+                term.accept(at, state);
+            }
+        })
     }
 
     /// Sum of all energies of the present state [J].
@@ -268,7 +306,8 @@ impl Engine {
             changed |= term.begin_step(state, &at);
         }
         if changed {
-            self.assembler.rebuild(state.positions.len(), &self.system.terms);
+            self.assembler
+                .rebuild(state.positions.len(), &self.system.terms);
         }
         Ok(f(self, &at))
     }
@@ -279,7 +318,11 @@ impl Engine {
         self.with_present(state, |engine, at| {
             let areas = &engine.system.cloth.vertex_areas;
             let (mut force, mut torque) = (Vec3::zeros(), Vec3::zeros());
-            for anchor in state.body_anchors.iter().filter(|a| a.body as usize == body) {
+            for anchor in state
+                .body_anchors
+                .iter()
+                .filter(|a| a.body as usize == body)
+            {
                 let i = anchor.vertex as usize;
                 let contact = at.world.bodies.contact(body);
                 let d = at.world.bodies.distance(body, &at.x[i]);
@@ -300,15 +343,15 @@ impl Engine {
 fn linear_solver(system: &System, settings: &Settings) -> Box<dyn LinearSolver> {
     let mesh = &system.cloth.mesh;
     let priorities = seam_priorities(mesh);
-    choose::solver(settings.linear_kind as u32, mesh.uv.len(), Some(&priorities))
+    choose::solver(
+        settings.linear_kind as u32,
+        mesh.uv.len(),
+        Some(&priorities),
+    )
 }
 
 /// Why a converged substep may still not stand.
-fn inadmissible(
-    system: &System,
-    at: &Configuration<'_>,
-    dynamic: bool,
-) -> Option<&'static str> {
+fn inadmissible(system: &System, at: &Configuration<'_>, dynamic: bool) -> Option<&'static str> {
     let (start, x) = (at.x0, at.x);
     let bodies = &system.bodies;
     for b in 0..bodies.count() {

@@ -34,6 +34,9 @@ pub struct Tolerance {
     pub iterations: u32,
     /// Relative residual of the linear solver.
     pub linear: f64,
+    /// Whether the exact Hessian is tried from the first iteration on; otherwise after the first
+    /// full step. Where it is not positive definite the semi-definite blocks take its place.
+    pub exact: bool,
 }
 
 /// How a solve ended.
@@ -52,6 +55,8 @@ pub struct Summary {
     pub static_residual: f64,
     /// Length of the last line search, 1 for a full step, 0 if none was found.
     pub last_length: f64,
+    /// Whether the last correction used the exact Hessian.
+    pub exact: bool,
 }
 
 /// What a Newton solve works on and with.
@@ -83,7 +88,12 @@ pub struct Work {
 
 impl Problem<'_> {
     fn at<'b>(&'b self, x: &'b [Vec3]) -> Configuration<'b> {
-        Configuration { x, x0: self.x0, inv_dt: self.inv_dt, world: self.world }
+        Configuration {
+            x,
+            x0: self.x0,
+            inv_dt: self.inv_dt,
+            world: self.world,
+        }
     }
 
     fn value(&self, x: &[Vec3]) -> f64 {
@@ -137,7 +147,12 @@ impl Problem<'_> {
         work: &mut Work,
     ) -> Result<Summary> {
         let n = x.len();
-        for v in [&mut work.gradient, &mut work.negative, &mut work.direction, &mut work.trial] {
+        for v in [
+            &mut work.gradient,
+            &mut work.negative,
+            &mut work.direction,
+            &mut work.trial,
+        ] {
             v.resize(n, Vec3::zeros());
         }
         let mut summary = Summary::default();
@@ -145,32 +160,54 @@ impl Problem<'_> {
         if !value.is_finite() {
             return Err(not_finite("energy"));
         }
+        // once the exact Hessian has failed this solve stays with the semi-definite blocks
+        let mut try_exact = tolerance.exact;
+        let mut may_try = true;
         for iteration in 0..tolerance.iterations {
-            let still = self.derivatives(x, HessianKind::Psd, assembler, &mut work.gradient);
-            summary.residual = largest(&work.gradient);
-            if iteration == 0 {
-                summary.static_residual = still;
-            }
-            if !summary.residual.is_finite() {
-                return Err(not_finite("force"));
-            }
-            if summary.residual <= tolerance.force {
-                summary.converged = true;
-                return Ok(summary);
+            loop {
+                let kind = if try_exact {
+                    HessianKind::Exact
+                } else {
+                    HessianKind::Psd
+                };
+                let still = self.derivatives(x, kind, assembler, &mut work.gradient);
+                summary.residual = largest(&work.gradient);
+                if iteration == 0 {
+                    summary.static_residual = still;
+                }
+                if !summary.residual.is_finite() {
+                    return Err(not_finite("force"));
+                }
+                if summary.residual <= tolerance.force {
+                    summary.converged = true;
+                    return Ok(summary);
+                }
+                for (m, g) in work.negative.iter_mut().zip(&work.gradient) {
+                    *m = -g;
+                }
+                let matrix = assembler.matrix();
+                let solved = linear.prepare(matrix).and_then(|()| {
+                    linear.solve(
+                        matrix,
+                        &work.negative,
+                        &mut work.direction,
+                        tolerance.linear,
+                    )
+                });
+                match solved {
+                    Ok(iterations) => {
+                        summary.linear_iterations += u64::from(iterations);
+                        summary.exact = try_exact;
+                        break;
+                    }
+                    Err(_) if try_exact => {
+                        try_exact = false;
+                        may_try = false;
+                    }
+                    Err(error) => return Err(linear_error(error)),
+                }
             }
             summary.iterations += 1;
-            for (m, g) in work.negative.iter_mut().zip(&work.gradient) {
-                *m = -g;
-            }
-            let matrix = assembler.matrix();
-            summary.linear_iterations += u64::from(
-                linear
-                    .prepare(matrix)
-                    .and_then(|()| {
-                        linear.solve(matrix, &work.negative, &mut work.direction, tolerance.linear)
-                    })
-                    .map_err(linear_error)?,
-            );
             let slope: f64 = dot(&work.gradient, &work.direction);
             let reach = largest(&work.direction);
             if !slope.is_finite() || !reach.is_finite() {
@@ -196,6 +233,7 @@ impl Problem<'_> {
                 }
             }
             summary.last_length = length;
+            try_exact = may_try && length >= 1.0;
             if length == 0.0 {
                 return Ok(summary);
             }
@@ -211,7 +249,10 @@ impl Problem<'_> {
 /// Largest Euclidean norm [same unit].
 pub fn largest(v: &[Vec3]) -> f64 {
     // max would swallow a NaN
-    v.iter().map(Vec3::norm_squared).fold(0.0, |a: f64, b| if b > a || b.is_nan() { b } else { a }).sqrt()
+    v.iter()
+        .map(Vec3::norm_squared)
+        .fold(0.0, |a: f64, b| if b > a || b.is_nan() { b } else { a })
+        .sqrt()
 }
 
 fn dot(a: &[Vec3], b: &[Vec3]) -> f64 {

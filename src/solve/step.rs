@@ -50,7 +50,12 @@ fn advance(engine: &mut Engine, state: &mut State, dt: f64) -> Result<Totals> {
                 add(&mut totals, &summary);
                 reason.to_owned()
             }
-            Err(error) if matches!(error.status, Status::NoAdmissibleState | Status::LinearSolve) => {
+            Err(error)
+                if matches!(
+                    error.status,
+                    Status::NoAdmissibleState | Status::LinearSolve
+                ) =>
+            {
                 error.message
             }
             Err(error) => return Err(error),

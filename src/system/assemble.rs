@@ -51,7 +51,10 @@ impl Assembler {
         if pattern != self.matrix.pattern {
             self.matrix = BlockMatrix::zeros(pattern);
         }
-        self.plans = terms.iter().map(|t| plan(&self.matrix.pattern, t.as_ref())).collect();
+        self.plans = terms
+            .iter()
+            .map(|t| plan(&self.matrix.pattern, t.as_ref()))
+            .collect();
     }
 
     /// The matrix last assembled.
@@ -91,11 +94,15 @@ impl Assembler {
             let largest = (BATCH_BLOCKS / block_count).max(1);
             for first in (0..count).step_by(largest) {
                 let batch = largest.min(count - first);
-                workers.chunks(&mut self.gradients[..batch * arity], CHUNK * arity, |c, chunk| {
-                    for (k, g) in chunk.chunks_mut(arity).enumerate() {
-                        term.gradient(first + c * CHUNK + k, at, g);
-                    }
-                });
+                workers.chunks(
+                    &mut self.gradients[..batch * arity],
+                    CHUNK * arity,
+                    |c, chunk| {
+                        for (k, g) in chunk.chunks_mut(arity).enumerate() {
+                            term.gradient(first + c * CHUNK + k, at, g);
+                        }
+                    },
+                );
                 for k in 0..batch {
                     let vertices = stencils.get(first + k);
                     for (v, g) in vertices.iter().zip(&self.gradients[k * arity..]) {
@@ -150,11 +157,18 @@ fn plan(pattern: &BlockPattern, term: &dyn Term) -> Vec<u32> {
 /// Makes pinned vertices keep their place: their rows and columns become the identity.
 pub fn fix_rows(matrix: &mut BlockMatrix, fixed: &[bool]) {
     for j in 0..matrix.n() {
-        let (from, to) = (matrix.pattern.starts[j] as usize, matrix.pattern.starts[j + 1] as usize);
+        let (from, to) = (
+            matrix.pattern.starts[j] as usize,
+            matrix.pattern.starts[j + 1] as usize,
+        );
         for k in from..to {
             let i = matrix.pattern.rows[k] as usize;
             if fixed[i] || fixed[j] {
-                matrix.blocks[k] = if i == j { Mat3::identity() } else { Mat3::zeros() };
+                matrix.blocks[k] = if i == j {
+                    Mat3::identity()
+                } else {
+                    Mat3::zeros()
+                };
             }
         }
     }

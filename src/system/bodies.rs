@@ -77,7 +77,12 @@ impl BodySet {
                     .map_err(|e| e.at(format!("body {b}")))?;
                 entry.start_vertices.clone_from(&body.vertices);
             }
-            let end = between(&entry.original, &body.vertices, &body.target_vertices, fraction);
+            let end = between(
+                &entry.original,
+                &body.vertices,
+                &body.target_vertices,
+                fraction,
+            );
             if entry.end_vertices != end {
                 entry.end = if end == entry.start_vertices {
                     entry.start.clone()
@@ -174,7 +179,11 @@ impl Bodies for BodySet {
 }
 
 fn shaped(original: &Body, vertices: &[Vec3]) -> Result<Body> {
-    if vertices.is_empty() { Ok(original.clone()) } else { original.deformed(vertices) }
+    if vertices.is_empty() {
+        Ok(original.clone())
+    } else {
+        original.deformed(vertices)
+    }
 }
 
 /// Vertices a fraction of the way from the present to the target; empty means "as created".
@@ -185,8 +194,15 @@ fn between(original: &Body, now: &[Vec3], target: &[Vec3], fraction: f64) -> Vec
     if fraction >= 1.0 {
         return target.to_vec();
     }
-    let now = if now.is_empty() { original.vertices() } else { now };
-    now.iter().zip(target).map(|(a, b)| a.lerp(b, fraction)).collect()
+    let now = if now.is_empty() {
+        original.vertices()
+    } else {
+        now
+    };
+    now.iter()
+        .zip(target)
+        .map(|(a, b)| a.lerp(b, fraction))
+        .collect()
 }
 
 /// Refuses a body number that does not exist.
@@ -195,6 +211,8 @@ pub fn check_index(body: u32, count: usize) -> Result<usize> {
     if index < count {
         Ok(index)
     } else {
-        Err(Error::argument(format!("body {body} does not exist; there are {count}")))
+        Err(Error::argument(format!(
+            "body {body} does not exist; there are {count}"
+        )))
     }
 }

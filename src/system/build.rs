@@ -1,7 +1,7 @@
 //! The only place that sees all terms: builds the ones that a garment and its fabrics call for.
 
-use super::bodies::BodySet;
 use super::air::Air;
+use super::bodies::BodySet;
 use super::contact::body::BodyContact;
 use super::contact::self_contact::SelfContact;
 use super::gravity::Gravity;
@@ -154,17 +154,28 @@ fn terms(cloth: &Cloth, options: &BuildOptions) -> Result<Vec<Box<dyn Term>>> {
         terms.push(Box::new(bending));
     }
     if cloth.mesh.seams.iter().any(|s| !s.links.is_empty()) {
-        terms.push(Box::new(SeamSprings::new(cloth, options.seam_stiffness, options.seam_pull)));
+        terms.push(Box::new(SeamSprings::new(
+            cloth,
+            options.seam_stiffness,
+            options.seam_pull,
+        )));
         terms.push(Box::new(SeamHinge::new(cloth)));
     }
     if options.air_drag > 0.0 || options.air_tangential > 0.0 {
-        terms.push(Box::new(Air::new(cloth, options.air_drag, options.air_tangential)));
+        terms.push(Box::new(Air::new(
+            cloth,
+            options.air_drag,
+            options.air_tangential,
+        )));
     }
     terms.push(Box::new(Pressure::new(cloth)));
     if options.self_contact {
         let friction = cloth.fabrics.iter().map(|f| f.friction).fold(0.0, f64::max);
-        terms.push(Box::new(SelfContact::new(cloth, options.self_stiffness, friction)?));
+        terms.push(Box::new(SelfContact::new(
+            cloth,
+            options.self_stiffness,
+            friction,
+        )?));
     }
     Ok(terms)
 }
-

@@ -4,8 +4,8 @@
 //! **Springs.** `gap = x_v - (1-t) x_a - t x_b`, stiffness `k = stiffness * length` of seam. A link that is
 //! open pulls with a bounded force (Huber): `k g^2/2` up to `g = d0`, `k d0 (g - d0/2)` beyond,
 //! with `d0 = pull / stiffness`, so that sewing from half a metre does not tear the cloth. A link whose gap
-//! is below `2 d0` when a step starts is sewn and pulls without bound during that step: a seam under
-//! load stays shut. Value and gradient are continuous; the Hessian is that of a convex function,
+//! is below 1 cm (or `2 d0`) when a step starts is sewn and pulls without bound during that step: a
+//! seam under load stays shut. Value and gradient are continuous; the Hessian is that of a convex function,
 //! `Psd` and `Exact` agree. Zero rest length, so that there is no force at rest and no torque. A link
 //! whose vertex is an end of its own receiving edge (the tip of a dart) has nothing to tie.
 //!
@@ -28,6 +28,9 @@ use crate::math::geometry::{
 use crate::math::{Mat2, Mat3, Vec2, Vec3};
 use crate::pattern::Fabric;
 use crate::tri::SeamLink;
+
+/// Gap below which a link is sewn [m].
+const SEWN: f64 = 0.01;
 
 /// Springs that close the seams.
 pub struct SeamSprings {
@@ -150,7 +153,7 @@ impl Term for SeamSprings {
     fn begin_step(&mut self, state: &State, _: &Configuration<'_>) -> bool {
         for e in 0..self.links.len() {
             let g = gap(self.link(e), self.links[e].t, &state.positions).norm();
-            self.links[e].sewn = g < 2.0 * self.elastic;
+            self.links[e].sewn = g < SEWN.max(2.0 * self.elastic);
         }
         false
     }

@@ -52,8 +52,7 @@ pub fn fingerprint(cloth: &Cloth) -> u64 {
 
 /// Bytes of a state.
 pub fn write(state: &State, fingerprint: u64) -> Result<Vec<u8>> {
-    let payload =
-        postcard::to_stdvec(state).map_err(|e| Error::state(format!("snapshot: {e}")))?;
+    let payload = postcard::to_stdvec(state).map_err(|e| Error::state(format!("snapshot: {e}")))?;
     let mut bytes = Vec::with_capacity(HEADER + payload.len() + 8);
     bytes.extend_from_slice(MAGIC);
     bytes.extend_from_slice(&VERSION.to_le_bytes());
@@ -70,7 +69,10 @@ pub fn write(state: &State, fingerprint: u64) -> Result<Vec<u8>> {
 pub fn read(bytes: &[u8], fingerprint: u64, like: &State) -> Result<State> {
     let bad = |what: String| Error::parse(format!("snapshot: {what}"));
     if bytes.len() < HEADER + 8 || &bytes[..8] != MAGIC {
-        return Err(bad(format!("{} bytes are not a snapshot of this library", bytes.len())));
+        return Err(bad(format!(
+            "{} bytes are not a snapshot of this library",
+            bytes.len()
+        )));
     }
     let number = |from: usize| {
         let mut b = [0_u8; 8];
@@ -79,11 +81,16 @@ pub fn read(bytes: &[u8], fingerprint: u64, like: &State) -> Result<State> {
     };
     let version = number(8) as u32;
     if version != VERSION {
-        return Err(bad(format!("version {version}, this library reads {VERSION}")));
+        return Err(bad(format!(
+            "version {version}, this library reads {VERSION}"
+        )));
     }
     let length = number(20);
     if length != (bytes.len() - HEADER - 8) as u64 {
-        return Err(bad(format!("{length} bytes announced, {} there", bytes.len() - HEADER - 8)));
+        return Err(bad(format!(
+            "{length} bytes announced, {} there",
+            bytes.len() - HEADER - 8
+        )));
     }
     let end = bytes.len() - 8;
     let mut hash = Hash::new();
@@ -92,10 +99,11 @@ pub fn read(bytes: &[u8], fingerprint: u64, like: &State) -> Result<State> {
         return Err(bad("the checksum does not agree".into()));
     }
     if number(12) != fingerprint {
-        return Err(bad("it was taken of another garment, resolution or fabric".into()));
+        return Err(bad(
+            "it was taken of another garment, resolution or fabric".into()
+        ));
     }
-    let state: State =
-        postcard::from_bytes(&bytes[HEADER..end]).map_err(|e| bad(e.to_string()))?;
+    let state: State = postcard::from_bytes(&bytes[HEADER..end]).map_err(|e| bad(e.to_string()))?;
     check(&state, like).map_err(bad)?;
     Ok(state)
 }
@@ -103,10 +111,17 @@ pub fn read(bytes: &[u8], fingerprint: u64, like: &State) -> Result<State> {
 fn check(state: &State, like: &State) -> std::result::Result<(), String> {
     let n = like.positions.len();
     if state.positions.len() != n || state.velocities.len() != n {
-        return Err(format!("{} vertices, {n} are expected", state.positions.len()));
+        return Err(format!(
+            "{} vertices, {n} are expected",
+            state.positions.len()
+        ));
     }
     if state.bodies.len() != like.bodies.len() {
-        return Err(format!("{} bodies, {} are expected", state.bodies.len(), like.bodies.len()));
+        return Err(format!(
+            "{} bodies, {} are expected",
+            state.bodies.len(),
+            like.bodies.len()
+        ));
     }
     let fine = |v: &Vec3| v.iter().all(|c| c.is_finite());
     let bodies_fine = state.bodies.iter().all(|b| {
@@ -127,7 +142,10 @@ fn check(state: &State, like: &State) -> std::result::Result<(), String> {
             a.a < a.b && (a.b as usize) < n && fine(&a.offset) && a.normal_force.is_finite()
         })
         && state.pair_anchors.is_sorted_by_key(|a| (a.a, a.b));
-    let pins_fine = state.pins.iter().all(|p| (p.vertex as usize) < n && fine(&p.target))
+    let pins_fine = state
+        .pins
+        .iter()
+        .all(|p| (p.vertex as usize) < n && fine(&p.target))
         && state.pins.windows(2).all(|w| w[0].vertex < w[1].vertex);
     let numbers_fine = state.time.is_finite()
         && state.step_size > 0.0

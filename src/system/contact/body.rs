@@ -84,7 +84,10 @@ impl Term for BodyContact {
     }
 
     fn stencils(&self) -> Stencils<'_> {
-        Stencils { arity: 1, vertices: &self.vertices }
+        Stencils {
+            arity: 1,
+            vertices: &self.vertices,
+        }
     }
 
     fn value(&self, e: usize, at: &Configuration<'_>) -> f64 {
@@ -126,7 +129,11 @@ impl Term for BodyContact {
             let k = bodies.contact(f.body as usize).stiffness * self.areas[e];
             let u = tangential(&f.normal, &(x - f.anchor));
             let length = u.norm();
-            g += if k * length <= f.limit { u * k } else { u * (f.limit / length) };
+            g += if k * length <= f.limit {
+                u * k
+            } else {
+                u * (f.limit / length)
+            };
         }
         out[0] = g;
     }
@@ -168,7 +175,8 @@ impl Term for BodyContact {
         self.clearance.clear();
         for x in at.x0 {
             for b in 0..self.body_count {
-                self.clearance.push(bodies.value(b, x) - bodies.contact(b).thickness);
+                self.clearance
+                    .push(bodies.value(b, x) - bodies.contact(b).thickness);
             }
         }
         self.friction.clear();
@@ -179,7 +187,9 @@ impl Term for BodyContact {
                 continue;
             }
             let d = bodies.distance(anchor.body as usize, &at.x0[anchor.vertex as usize]);
-            let Some(normal) = d.gradient.try_normalize(1e-12) else { continue };
+            let Some(normal) = d.gradient.try_normalize(1e-12) else {
+                continue;
+            };
             self.friction_starts[anchor.vertex as usize + 1] += 1;
             self.friction.push(Friction {
                 body: anchor.body,
@@ -214,7 +224,11 @@ impl Term for BodyContact {
                         let u = tangential(&normal, &(x - f.anchor));
                         let reach = contact.friction * normal_force / k;
                         let length = u.norm();
-                        if length <= reach { x - u } else { x - u * (reach / length) }
+                        if length <= reach {
+                            x - u
+                        } else {
+                            x - u * (reach / length)
+                        }
                     }
                     None => x,
                 };
