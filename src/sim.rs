@@ -529,7 +529,7 @@ impl Sim {
                 "membrane" => out.membrane += value,
                 "hinge" | "quadratic_bending" => out.bending += value,
                 "seam" | "seam_hinge" => out.seam += value,
-                "body_contact" | "self_contact" => out.contact += value,
+                "body_contact" | "edge_contact" | "self_contact" => out.contact += value,
                 _ => {}
             }
         }

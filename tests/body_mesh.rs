@@ -157,7 +157,7 @@ fn mesh_field_gradient_and_hessian_are_derivatives_of_its_value() {
     let mut r = Random(3);
     let e = 1e-6;
     let mut compared = 0;
-    for _ in 0..4000 {
+    for _ in 0..1000 {
         // inside, in the band, across levels, beyond the box
         let x = r.point(1.2);
         let at = body.distance(&x);
@@ -467,7 +467,7 @@ fn real_bodies_have_the_sign_of_their_winding_number() {
             "  built in {built:?}, bricks {bricks:?}, {:.1} MB",
             bytes as f64 / 1e6
         );
-        let (n, far, any, depth, error) = compare(&body, 9, 4000);
+        let (n, far, any, depth, error) = compare(&body, 9, 1000);
         println!(
             "  {n} points: {far} wrong signs beyond a cell, {any} in all (deepest {depth:.2e} m), \
              value error within two cells {error:.2e} m"

@@ -316,24 +316,9 @@ impl Engine {
     pub fn body_wrench(&mut self, state: &State, body: usize) -> Result<(Vec3, Vec3)> {
         let origin = state.bodies[body].pose.position;
         self.with_present(state, |engine, at| {
-            let areas = &engine.system.cloth.vertex_areas;
             let (mut force, mut torque) = (Vec3::zeros(), Vec3::zeros());
-            for anchor in state
-                .body_anchors
-                .iter()
-                .filter(|a| a.body as usize == body)
-            {
-                let i = anchor.vertex as usize;
-                let contact = at.world.bodies.contact(body);
-                let d = at.world.bodies.distance(body, &at.x[i]);
-                let depth = (contact.thickness - d.value).max(0.0);
-                let k = contact.stiffness * areas[i];
-                let normal = d.gradient;
-                let offset = at.x[i] - anchor.point;
-                let slide = offset - normal * normal.dot(&offset);
-                let f = slide * k - normal * (k * depth);
-                force += f;
-                torque += (at.x[i] - origin).cross(&f);
+            for term in &engine.system.terms {
+                term.add_wrench(body, at, &origin, &mut force, &mut torque);
             }
             (force, torque)
         })

@@ -3,6 +3,7 @@
 use super::air::Air;
 use super::bodies::BodySet;
 use super::contact::body::BodyContact;
+use super::contact::edge::EdgeContact;
 use super::contact::self_contact::SelfContact;
 use super::gravity::Gravity;
 use super::hinge::Hinge;
@@ -146,6 +147,7 @@ fn terms(cloth: &Cloth, options: &BuildOptions) -> Result<Vec<Box<dyn Term>>> {
         Box::new(Gravity::new(cloth)),
         Box::new(Membrane::new(cloth)),
         Box::new(BodyContact::new(cloth)),
+        Box::new(EdgeContact::new(cloth)),
     ];
     for bending in Hinge::terms(cloth) {
         terms.push(Box::new(bending));

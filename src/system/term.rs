@@ -154,6 +154,17 @@ pub trait Term: Send + Sync {
         let _ = at;
         1.0
     }
+    /// Adds the force on a body and its torque about `origin` [N], [N m].
+    fn add_wrench(
+        &self,
+        body: usize,
+        at: &Configuration<'_>,
+        origin: &Vec3,
+        force: &mut Vec3,
+        torque: &mut Vec3,
+    ) {
+        let _ = (body, at, origin, force, torque);
+    }
     /// After an accepted step: moves friction anchors and other plastic state.
     fn accept(&mut self, at: &Configuration<'_>, state: &mut State) {
         let _ = (at, state);

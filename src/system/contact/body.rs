@@ -204,6 +204,33 @@ impl Term for BodyContact {
         false
     }
 
+    fn add_wrench(
+        &self,
+        body: usize,
+        at: &Configuration<'_>,
+        origin: &Vec3,
+        force: &mut Vec3,
+        torque: &mut Vec3,
+    ) {
+        let contact = at.world.bodies.contact(body);
+        for e in 0..self.vertices.len() {
+            let x = &at.x[e];
+            let k = contact.stiffness * self.areas[e];
+            let mut f = Vec3::zeros();
+            if self.touching(e, at).any(|b| b == body) {
+                let d = at.world.bodies.distance(body, x);
+                f -= d.gradient * (k * (contact.thickness - d.value).max(0.0));
+            }
+            for friction in self.frictions(e).iter().filter(|f| f.body as usize == body) {
+                let u = tangential(&friction.normal, &(x - friction.anchor));
+                let length = u.norm();
+                f += if k * length <= friction.limit { u * k } else { u * (friction.limit / length) };
+            }
+            *force += f;
+            *torque += (x - origin).cross(&f);
+        }
+    }
+
     fn accept(&mut self, at: &Configuration<'_>, state: &mut State) {
         let bodies = at.world.bodies;
         state.body_anchors.clear();

@@ -2,6 +2,7 @@
 
 pub mod body;
 pub mod crossing;
+pub mod edge;
 pub mod self_contact;
 pub mod spheres;
 pub mod travel;

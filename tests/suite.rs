@@ -1,0 +1,64 @@
+//! All tests that can share a process, one module for each file.
+
+#[path = "abi.rs"]
+mod abi;
+#[path = "body_contact_term.rs"]
+mod body_contact_term;
+#[path = "body_mannequin.rs"]
+mod body_mannequin;
+#[path = "body_mesh.rs"]
+mod body_mesh;
+#[path = "body_shapes.rs"]
+mod body_shapes;
+#[path = "c_examples.rs"]
+mod c_examples;
+#[path = "capi_contract.rs"]
+mod capi_contract;
+#[path = "capi_random_calls.rs"]
+mod capi_random_calls;
+#[path = "capi_threads.rs"]
+mod capi_threads;
+#[path = "cli_toile.rs"]
+mod cli_toile;
+#[path = "docs.rs"]
+mod docs;
+#[path = "header.rs"]
+mod header;
+#[path = "layering.rs"]
+mod layering;
+#[path = "linear_solvers.rs"]
+mod linear_solvers;
+#[path = "pattern_bytes.rs"]
+mod pattern_bytes;
+#[path = "pattern_check.rs"]
+mod pattern_check;
+#[path = "pattern_examples.rs"]
+mod pattern_examples;
+#[path = "pattern_garmentcode.rs"]
+mod pattern_garmentcode;
+#[path = "pattern_materials.rs"]
+mod pattern_materials;
+#[path = "python_driver.rs"]
+mod python_driver;
+#[path = "readout_real_bodies.rs"]
+mod readout_real_bodies;
+#[path = "real_garments.rs"]
+mod real_garments;
+#[path = "reference_bending.rs"]
+mod reference_bending;
+#[path = "reference_membrane.rs"]
+mod reference_membrane;
+#[path = "scene_reader.rs"]
+mod scene_reader;
+#[path = "self_contact_sheets.rs"]
+mod self_contact_sheets;
+#[path = "self_contact_term.rs"]
+mod self_contact_term;
+#[path = "terms_fd.rs"]
+mod terms_fd;
+#[path = "terms_physics.rs"]
+mod terms_physics;
+#[path = "tri_garments.rs"]
+mod tri_garments;
+#[path = "tri_real.rs"]
+mod tri_real;
