@@ -51,7 +51,7 @@ int main(void) {
     toile_garment_desc garment_desc;
     CALL(toile_garment_desc_init(&garment_desc, sizeof garment_desc));
     garment_desc.name = "tunic";
-    garment_desc.edge_length = 0.03;
+    garment_desc.edge_length = 0.045;
     toile_garment *garment = NULL;
     CALL(toile_garment_create(&garment_desc, &garment));
     uint32_t front = add_panel(garment, "front", 0.16, 0);

@@ -847,7 +847,7 @@ toile_status toile_garment_panel_name(const struct toile_garment *garment,
                                       size_t *needed);
 
 /**
- * What fabrics read so far contained that is not used: lines of UTF-8 text, empty for nothing.
+ * What the garment's and its fabrics' files contained that is not used: lines of UTF-8 text, empty for nothing.
  * `needed` gets the bytes, the final NUL included; `out` NULL asks for it.
  */
 toile_status toile_garment_warnings(const struct toile_garment *garment,

@@ -535,7 +535,11 @@ fn a_grid_body_has_the_distances_it_was_given() {
     let node = [0.1, 0.0, 0.15];
     ok(unsafe { toile_body_distance(body.0, node.as_ptr(), &mut distance, gradient.as_mut_ptr()) });
     let exact = (0.1_f64.powi(2) + 0.15_f64.powi(2)).sqrt() - 0.1;
-    assert!((distance - exact).abs() < 1e-9, "{distance} {exact}");
+    // the field is smoothed: it passes the nodes within the cube of the cell size
+    assert!(
+        (distance - exact).abs() < 0.05_f64.powi(3),
+        "{distance} {exact}"
+    );
     assert!(gradient[0] > 0.0 && gradient[2] > 0.0);
 }
 

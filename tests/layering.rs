@@ -4,9 +4,27 @@
 use std::path::{Path, PathBuf};
 
 /// The order of imports; modules that do not exist yet are named too.
-const ORDER: [&str; 19] = [
-    "error", "math", "pattern", "body", "tri", "cloth", "yarn", "blend", "system", "solve", "gpu",
-    "fabric", "readout", "indicate", "design", "scene", "sim", "report", "capi",
+const ORDER: [&str; 20] = [
+    "error",
+    "math",
+    "pattern",
+    "body",
+    "tri",
+    "cloth",
+    "yarn",
+    "blend",
+    "system",
+    "solve",
+    "gpu",
+    "fabric",
+    "readout",
+    "indicate",
+    "design",
+    "scene",
+    "sim",
+    "sim_scene",
+    "report",
+    "capi",
 ];
 /// Side by side at the right end: none imports another.
 const ENDS: [&str; 3] = ["capi", "fmi", "bin"];

@@ -114,7 +114,7 @@ pub fn square(edge_length: f64, y: f64) -> Garment {
 
 /// The tunic of `examples_c/02_panels.c`.
 pub fn tunic() -> Garment {
-    let garment = Garment::empty(0.03);
+    let garment = Garment::empty(0.045);
     let corners = [
         -0.22, 0.0, 0.22, 0.0, 0.22, 0.5, 0.08, 0.5, -0.08, 0.5, -0.22, 0.5,
     ];
