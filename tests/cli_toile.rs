@@ -290,6 +290,44 @@ fn mannequin_is_a_closed_surface() {
 }
 
 #[test]
+fn picture_draws_model_files_and_names_what_it_cannot() {
+    let folder = Folder::new("picture");
+    let square = folder.write("g.obj", "v 0 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nf 1 2 3 4\n");
+    let body = folder.write("b.obj", "v 0 0 0\nv 100 0 0\nv 0 100 0\nf 1 2 3\n");
+    let draw = |name: &str, more: &[&str]| {
+        let out = folder.0.join(name);
+        let mut args = vec!["picture", path(&square), "--out", path(&out)];
+        args.extend(more);
+        let output = toile(&args);
+        assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+        std::fs::read(&out).unwrap()
+    };
+    let alone = draw("alone.png", &[]);
+    assert!(alone.starts_with(b"\x89PNG"));
+    let with_body = draw("body.png", &["--body", path(&body), "--body-scale", "0.01"]);
+    assert_ne!(alone, with_body, "the body is not drawn");
+
+    let out = folder.0.join("none.png");
+    let points = folder.write("p.obj", "v 0 0 0\n");
+    for (garment, words) in [
+        (&points, "no faces"),
+        (&folder.0.join("missing.obj"), "missing.obj"),
+    ] {
+        let output = toile(&["picture", path(garment), "--out", path(&out)]);
+        assert_eq!(code(&output), 1);
+        assert!(
+            text(&output.stderr).contains(words),
+            "{}",
+            text(&output.stderr)
+        );
+        assert!(!out.exists());
+    }
+    let nowhere = folder.0.join("no/folder/p.png");
+    let output = toile(&["picture", path(&square), "--out", path(&nowhere)]);
+    assert_eq!(code(&output), 4);
+}
+
+#[test]
 fn a_real_pattern_on_a_real_body_is_built() {
     let Some(data) = std::env::var_os("TOILE_DATA").map(PathBuf::from) else {
         assert_ne!(

@@ -24,6 +24,13 @@ use crate::math::parallel::Workers;
 use crate::math::{Mat3, Rotation, Vec3};
 use std::sync::Arc;
 
+/// Positions [m] and triangles of a Wavefront OBJ file, in the file's order; `scale` multiplies its
+/// coordinates. The mesh need not be closed.
+pub fn read_obj(path: &std::path::Path, scale: f64) -> Result<mannequin::Mesh> {
+    let (positions, triangles) = obj::read(path, scale)?;
+    Ok((positions.into_iter().map(Vec3::from).collect(), triangles))
+}
+
 /// Signed distance and its derivatives at a point of the body's own frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Distance {

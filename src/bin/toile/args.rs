@@ -37,6 +37,20 @@ pub(crate) enum Command {
         #[arg(long, default_value_t = 0.0)]
         cell: f64,
     },
+    /// Draws model files: front, side and back beside each other, y up.
+    Picture {
+        /// Garment (OBJ, metres); each connected piece gets its own colour.
+        garment: PathBuf,
+        /// Body to draw with it (OBJ); may be given several times.
+        #[arg(long, value_name = "BODY.obj")]
+        body: Vec<PathBuf>,
+        /// Factor from the body files' coordinates to metres.
+        #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
+        body_scale: f64,
+        /// PNG file to write.
+        #[arg(long, value_name = "PNG")]
+        out: PathBuf,
+    },
 }
 
 /// What to read.

@@ -7,6 +7,7 @@
 mod args;
 mod info;
 mod output;
+mod picture;
 mod run;
 mod summary;
 
@@ -36,6 +37,12 @@ fn main() -> ExitCode {
             }
         }
         Command::Mannequin { out, cell } => info::mannequin(out, *cell),
+        Command::Picture {
+            garment,
+            body,
+            body_scale,
+            out,
+        } => picture::picture(garment, body, *body_scale, out),
     };
     match result {
         Ok(code) => code,
