@@ -22,7 +22,7 @@ struct Case {
 /// A sheet bent over the top of a sphere, a little too deep everywhere.
 fn case() -> (Cloth, Case) {
     let garment = sheet_garment(0.06, 0.06, 0.02, Fabric::default());
-    let mesh = structured_sheet(0.06, 0.06, 3, 3, SheetPattern::Alternating);
+    let mesh = structured_sheet(0.06, 0.06, 3, 3, SheetPattern::Alternating).expect("mesh");
     let cloth = Cloth::new(&garment, mesh).expect("cloth");
     let x: Vec<Vec3> = cloth
         .mesh
@@ -35,7 +35,10 @@ fn case() -> (Cloth, Case) {
         })
         .collect();
     let mut bodies = BodySet::default();
-    let entry = bodies.add(&Body::sphere(RADIUS).expect("sphere"), &ContactSettings::default());
+    let entry = bodies.add(
+        &Body::sphere(RADIUS).expect("sphere"),
+        &ContactSettings::default(),
+    );
     let anchors = (0..x.len())
         .map(|i| BodyAnchor {
             vertex: i as u32,
@@ -61,6 +64,15 @@ fn case() -> (Cloth, Case) {
     (cloth, Case { bodies, state, x })
 }
 
+fn configuration<'a>(x: &'a [Vec3], x0: &'a [Vec3], world: &'a World<'a>) -> Configuration<'a> {
+    Configuration {
+        x,
+        x0,
+        inv_dt: 0.0,
+        world,
+    }
+}
+
 fn check(term: &mut dyn Term, case: &Case) {
     let world = World {
         gravity: Vec3::zeros(),
@@ -68,8 +80,7 @@ fn check(term: &mut dyn Term, case: &Case) {
         pressure: 0.0,
         bodies: &case.bodies,
     };
-    let at = |x| Configuration { x, x0: case.x.as_slice(), inv_dt: 0.0, world: &world };
-    term.begin_step(&case.state, &at(&case.x));
+    term.begin_step(&case.state, &configuration(&case.x, &case.x, &world));
     let count = term.stencils().count();
     let arity = term.stencils().arity;
     let mut active = 0;
@@ -77,12 +88,17 @@ fn check(term: &mut dyn Term, case: &Case) {
         let vertices: Vec<usize> = term.stencils().get(e).iter().map(|v| *v as usize).collect();
         let gradient = |x: &[Vec3]| {
             let mut g = vec![Vec3::zeros(); arity];
-            term.gradient(e, &at(x), &mut g);
+            term.gradient(e, &configuration(&x, &case.x, &world), &mut g);
             g
         };
         let g = gradient(&case.x);
         let mut h = vec![Mat3::zeros(); arity * (arity + 1) / 2];
-        term.hessian(e, &at(&case.x), HessianKind::Exact, &mut h);
+        term.hessian(
+            e,
+            &configuration(&case.x, &case.x, &world),
+            HessianKind::Exact,
+            &mut h,
+        );
         let scale = g.iter().map(|g| g.norm()).fold(1e-6, f64::max);
         let stiffness = h.iter().map(|h| h.norm()).fold(1.0, f64::max);
         active += usize::from(scale > 1e-3);
@@ -95,9 +111,14 @@ fn check(term: &mut dyn Term, case: &Case) {
                     x
                 };
                 let (plus, minus) = (moved(step), moved(-step));
-                let slope =
-                    (term.value(e, &at(&plus)) - term.value(e, &at(&minus))) / (2.0 * step);
-                assert!((slope - g[i][d]).abs() < 1e-5 * scale, "{} {e}", term.name());
+                let slope = (term.value(e, &configuration(&plus, &case.x, &world))
+                    - term.value(e, &configuration(&minus, &case.x, &world)))
+                    / (2.0 * step);
+                assert!(
+                    (slope - g[i][d]).abs() < 1e-5 * scale,
+                    "{} {e}",
+                    term.name()
+                );
                 let (gp, gm) = (gradient(&plus), gradient(&minus));
                 for j in 0..arity {
                     let column = (gp[j] - gm[j]) / (2.0 * step);
@@ -106,12 +127,20 @@ fn check(term: &mut dyn Term, case: &Case) {
                     } else {
                         h[i * (i + 1) / 2 + j].row(d).transpose()
                     };
-                    assert!((column - block).norm() < 1e-4 * stiffness, "{} {e}", term.name());
+                    assert!(
+                        (column - block).norm() < 1e-4 * stiffness,
+                        "{} {e}",
+                        term.name()
+                    );
                 }
             }
         }
     }
-    assert!(active > count / 4, "{}: only {active} of {count} stencils act", term.name());
+    assert!(
+        active > count / 4,
+        "{}: only {active} of {count} stencils act",
+        term.name()
+    );
 }
 
 #[test]
@@ -136,9 +165,16 @@ fn wrench_on_a_body_is_the_reaction_of_the_cloth() {
         pressure: 0.0,
         bodies: &case.bodies,
     };
-    let at = Configuration { x: &case.x, x0: &case.x, inv_dt: 0.0, world: &world };
-    let terms: [Box<dyn Term>; 2] =
-        [Box::new(BodyContact::new(&cloth)), Box::new(EdgeContact::new(&cloth))];
+    let at = Configuration {
+        x: &case.x,
+        x0: &case.x,
+        inv_dt: 0.0,
+        world: &world,
+    };
+    let terms: [Box<dyn Term>; 2] = [
+        Box::new(BodyContact::new(&cloth)),
+        Box::new(EdgeContact::new(&cloth)),
+    ];
     for mut term in terms {
         term.begin_step(&case.state, &at);
         let (mut force, mut torque) = (Vec3::zeros(), Vec3::zeros());

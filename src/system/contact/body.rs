@@ -224,7 +224,11 @@ impl Term for BodyContact {
             for friction in self.frictions(e).iter().filter(|f| f.body as usize == body) {
                 let u = tangential(&friction.normal, &(x - friction.anchor));
                 let length = u.norm();
-                f += if k * length <= friction.limit { u * k } else { u * (friction.limit / length) };
+                f += if k * length <= friction.limit {
+                    u * k
+                } else {
+                    u * (friction.limit / length)
+                };
             }
             *force += f;
             *torque += (x - origin).cross(&f);

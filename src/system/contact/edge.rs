@@ -67,7 +67,10 @@ impl EdgeContact {
     /// Stiffness and depth below half the thickness.
     fn depth(&self, e: usize, b: usize, at: &Configuration<'_>, distance: f64) -> (f64, f64) {
         let contact = at.world.bodies.contact(b);
-        (contact.stiffness * self.areas[e], 0.5 * contact.thickness - distance)
+        (
+            contact.stiffness * self.areas[e],
+            0.5 * contact.thickness - distance,
+        )
     }
 }
 
@@ -131,7 +134,8 @@ impl Term for EdgeContact {
             let m = self.middle(e, at.x0);
             for b in 0..self.body_count {
                 let thickness = at.world.bodies.contact(b).thickness;
-                self.clearance.push(at.world.bodies.value(b, &m) - 0.5 * thickness);
+                self.clearance
+                    .push(at.world.bodies.value(b, &m) - 0.5 * thickness);
             }
         }
         false
