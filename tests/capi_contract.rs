@@ -251,7 +251,7 @@ fn short_descriptions_mean_defaults_and_short_reports_are_not_overrun() {
 
     // sizes that cannot be are refused before anything happens
     let before = (sim.save(), sim.epoch());
-    for size in [0, 4, 5000, usize::MAX] {
+    for size in [0, 4, 20, 5000, usize::MAX] {
         let mut bad = [size, 0, 0, 0, 0, 0, 0, 0];
         let p = bad.as_mut_ptr();
         unsafe {

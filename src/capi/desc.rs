@@ -2,7 +2,8 @@
 //!
 //! The caller says in `struct_size` how large the struct was when the host was compiled. Reading
 //! copies the smaller of the two sizes over the defaults, writing copies the smaller of the two
-//! sizes, so either side may be newer. No struct has hidden padding (a test counts the bytes):
+//! sizes, so either side may be newer. Sizes are multiples of 8, and so are the places of 8-byte
+//! fields: a size never cuts a pointer in two. No struct has hidden padding (a test counts the bytes):
 //! otherwise a field appended later could lie in what an older host left uninitialised.
 
 use crate::error::{Error, Result, Status};
@@ -24,7 +25,8 @@ pub(super) unsafe trait Versioned: Copy {
 }
 
 fn check_size<T: Versioned>(size: usize) -> Result<()> {
-    if (size_of::<usize>()..=LARGEST).contains(&size) {
+    let is_whole = size.is_multiple_of(size_of::<usize>());
+    if (size_of::<usize>()..=LARGEST).contains(&size) && is_whole {
         return Ok(());
     }
     Err(Error::new(
@@ -162,7 +164,7 @@ mod tests {
 
     #[test]
     fn sizes_that_cannot_be_are_refused() {
-        for size in [0, 1, 7, 4097, usize::MAX] {
+        for size in [0, 1, 7, 12, 17, 4097, usize::MAX] {
             let mut bad = [size, 0, 0];
             let p = bad.as_mut_ptr().cast::<Thing>();
             // SAFETY: the size is looked at before anything else.

@@ -131,7 +131,8 @@ impl BodySet {
             if d < -depth && end > d + depth {
                 return true;
             }
-            s += d.abs().max(0.5 * depth).max(1e-5);
+            // however long the path, it is marched in a bounded number of strides
+            s += d.abs().max(0.5 * depth).max(1e-5).max(1e-4 * length);
         }
         false
     }

@@ -218,6 +218,7 @@ fn size(choices: &mut Choices<'_>, right: usize) -> usize {
         0 => 0,
         1 => usize::MAX,
         2 => 8 + choices.below(right - 8),
+        3 => 8 * (1 + choices.below(right / 8)),
         _ => right,
     }
 }
@@ -490,7 +491,14 @@ fn change_sim(world: &World, choices: &mut Choices<'_>) -> toile_status {
     let uv = choices.numbers(8);
     let status = unsafe {
         match choices.below(14) {
-            0..4 => toile_sim_step(sim, choices.near(0.01), report),
+            0..4 => {
+                // days of simulated time would be done, and take days
+                let dt = match choices.near(0.01) {
+                    dt if dt > 0.1 && dt < 1e7 => 0.1,
+                    dt => dt,
+                };
+                toile_sim_step(sim, dt, report)
+            }
             4 => {
                 let mut desc = filled(toile_drape_desc_init);
                 let mut left = 1 + choices.below(4) as u32;
@@ -744,7 +752,7 @@ pub fn read_text(bytes: &[u8]) -> toile_status {
             toile_garment_free(garment);
             if !sim.is_null() {
                 let before = state(sim);
-                let stepped = toile_sim_step(sim, 0.01, ptr::null_mut());
+                let stepped = toile_sim_step(sim, 1e-4, ptr::null_mut());
                 sane(stepped);
                 assert!(stepped == TOILE_OK || state(sim).map(|s| s.0) == before.map(|s| s.0));
                 toile_sim_free(sim);
