@@ -35,7 +35,7 @@ lint:
 	$(CARGO) fmt --check
 	$(CARGO) clippy --release --all-targets -- -D warnings
 
-test: tools lint all
+test: tools lint
 	$(CARGO) test --release
 
 quick:

@@ -8,12 +8,12 @@
 use std::time::Instant;
 use toile::body::Body;
 use toile::math::Vec3;
-use toile::pattern::{Fabric, Garment, Panel};
+use toile::pattern::{Fabric, Garment};
 use toile::sim::{ContactSettings, Settings, Sim, SimOptions};
-use toile::tri::grid::{SheetPattern, structured_sheet};
+use toile::tri::grid::{SheetPattern, rectangle, structured_sheet};
 
 fn scene(n: usize) -> Sim {
-    let mut mesh = structured_sheet(1.0, 1.0, n - 1, n - 1, SheetPattern::Alternating);
+    let mut mesh = structured_sheet(1.0, 1.0, n - 1, n - 1, SheetPattern::Alternating).expect("mesh");
     for p in &mut mesh.placed {
         *p = Vec3::new(p.x - 0.5, 0.35, p.y - 0.5);
     }
@@ -24,7 +24,7 @@ fn scene(n: usize) -> Sim {
     let garment = Garment {
         fabrics: vec![fabric],
         edge_length: 0.02,
-        panels: vec![Panel::rectangle("sheet", 1.0, 1.0)],
+        panels: vec![rectangle("sheet", 1.0, 1.0)],
         ..Garment::default()
     };
     let mut settings = Settings::default();

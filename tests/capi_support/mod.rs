@@ -127,7 +127,10 @@ pub fn library_dir() -> &'static Path {
         let target = target_dir();
         let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
         let output = Command::new(cargo)
-            .args(["build", "--release", "--lib", "--locked", "--target-dir"])
+            .args(["build", "--release", "--lib", "--locked"])
+            // with a test among the targets cargo resolves features as for the tests, and
+            // nothing is built twice
+            .args(["--test", "linear_allocations", "--target-dir"])
             .arg(&target)
             .current_dir(root())
             .output()
