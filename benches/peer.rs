@@ -13,7 +13,8 @@ use toile::sim::{ContactSettings, Settings, Sim, SimOptions};
 use toile::tri::grid::{SheetPattern, rectangle, structured_sheet};
 
 fn scene(n: usize) -> Sim {
-    let mut mesh = structured_sheet(1.0, 1.0, n - 1, n - 1, SheetPattern::Alternating).expect("mesh");
+    let mut mesh =
+        structured_sheet(1.0, 1.0, n - 1, n - 1, SheetPattern::Alternating).expect("mesh");
     for p in &mut mesh.placed {
         *p = Vec3::new(p.x - 0.5, 0.35, p.y - 0.5);
     }

@@ -221,7 +221,7 @@ fn errors_name_the_json_path() {
         ),
         (
             2,
-            "[-0.265, 0.0]",
+            "[-0.265, -0.06]",
             "[-0.265]",
             "panels[0].vertices[0]: must have 2",
         ),
