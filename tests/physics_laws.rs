@@ -90,8 +90,8 @@ fn slide(mu: f64, tangent: f64, dt: f64, duration: f64) -> (f64, f64) {
 
 #[test]
 fn a_patch_slides_on_an_incline_iff_its_tangent_exceeds_the_friction() {
-    for mu in [0.2, 0.5, 1.0] {
-        for dt in [0.002, 0.01] {
+    for mu in [0.2, 1.0] {
+        for dt in [0.004, 0.01] {
             let (stuck, _) = slide(mu, 0.99 * mu, dt, 1.0);
             let tangent = 1.01 * mu;
             let (slid, speed) = slide(mu, tangent, dt, 1.0);
@@ -116,7 +116,7 @@ fn energy_never_grows_without_work() {
     for dt in [0.001_f64, 0.005, 0.02] {
         let mut sim = sheet(
             0.3,
-            10,
+            8,
             Fabric::default(),
             [0.0, -G, 0.0],
             default_tolerance(),
@@ -124,12 +124,12 @@ fn energy_never_grows_without_work() {
         // horizontal, held at two corners
         let placed: Vec<[f64; 3]> = sim.positions().iter().map(|p| [p.x, 0.0, p.y]).collect();
         sim.set_positions(&placed, None).unwrap();
-        sim.pin(&[0, 10], None).unwrap();
+        sim.pin(&[0, 8], None).unwrap();
         let first = sim.report().unwrap();
         let mut energy = first.potential_energy + first.kinetic_energy;
         let (start, scale) = (energy, sim.masses().iter().sum::<f64>() * G * 0.3);
         let mut growth = 0.0_f64;
-        for _ in 0..(0.6 / dt).round() as usize {
+        for _ in 0..(0.3 / dt).round() as usize {
             let report = sim.step(dt).unwrap();
             let now = report.potential_energy + report.kinetic_energy;
             growth = growth.max(now - energy);
@@ -272,7 +272,7 @@ fn a_draped_sheet_hangs_as_long_as_its_weight_pulls_it() {
 
 /// A sheet folded over itself with a gap that closes, falling on a ball.
 fn folded_on_a_ball(threads: f64, self_contact: f64) -> Sim {
-    let n = 40;
+    let n = 24;
     let settings = Settings {
         threads,
         self_contact,
@@ -282,7 +282,7 @@ fn folded_on_a_ball(threads: f64, self_contact: f64) -> Sim {
     sim.add_body(&Body::sphere(0.1).unwrap(), &ContactSettings::default())
         .unwrap();
     // the fold is a half circle of radius r around the middle line
-    let r = 0.012;
+    let r = 0.018;
     let arc = std::f64::consts::PI * r;
     let mut velocities = Vec::new();
     let positions: Vec<[f64; 3]> = sim
@@ -318,7 +318,7 @@ fn bits(sim: &Sim) -> Vec<u64> {
 fn one_and_two_threads_give_the_same_bits() {
     let run = |threads, self_contact| {
         let mut sim = folded_on_a_ball(threads, self_contact);
-        for _ in 0..8 {
+        for _ in 0..6 {
             sim.step(0.005).unwrap();
         }
         assert!(sim.energies().unwrap().contact > 0.0);
@@ -332,14 +332,14 @@ fn one_and_two_threads_give_the_same_bits() {
 #[test]
 fn a_restored_snapshot_continues_bitwise() {
     let mut sim = folded_on_a_ball(1.0, 1.0);
-    for _ in 0..6 {
+    for _ in 0..4 {
         sim.step(0.005).unwrap();
     }
     let bytes = sim.save().unwrap();
     let mut other = folded_on_a_ball(2.0, 1.0);
     other.restore(&bytes).unwrap();
     assert_eq!(bytes, other.save().unwrap());
-    for k in 0..5 {
+    for k in 0..3 {
         sim.step(0.005).unwrap();
         other.step(0.005).unwrap();
         assert!(sim.save().unwrap() == other.save().unwrap(), "step {k}");
