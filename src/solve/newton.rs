@@ -86,6 +86,11 @@ pub struct Work {
     trial: Vec<Vec3>,
 }
 
+/// Part of the displacement tolerance below which a force that inertia alone resists is no force.
+const UNMOVED: f64 = 1e-3;
+/// Small corrections in one solve that are not taken for convergence at once.
+const DOUBTS: u32 = 4;
+
 impl Problem<'_> {
     fn at<'b>(&'b self, x: &'b [Vec3]) -> Configuration<'b> {
         Configuration {
@@ -137,6 +142,25 @@ impl Problem<'_> {
         residual
     }
 
+    /// Largest force on a free vertex at `x` [N], and how far the free vertices would be carried if
+    /// nothing but inertia resisted it [m].
+    fn remains(&self, x: &[Vec3], assembler: &mut Assembler, gradient: &mut [Vec3]) -> (f64, f64) {
+        gradient.fill(Vec3::zeros());
+        assembler.add(self.terms, &self.at(x), None, self.workers, gradient);
+        let (mut force, mut reach) = (0.0_f64, 0.0_f64);
+        for (i, g) in gradient.iter_mut().enumerate() {
+            if self.fixed[i] {
+                continue;
+            }
+            let weight = self.inertia.weight[i];
+            *g += (x[i] - self.inertia.center[i]) * weight;
+            let size = g.norm();
+            force = force.max(size);
+            reach = reach.max(size / weight);
+        }
+        (force, reach)
+    }
+
     /// Minimises `Phi` from `x`, which holds the best admissible point on return.
     pub fn minimise(
         &self,
@@ -163,6 +187,7 @@ impl Problem<'_> {
         // once the exact Hessian has failed this solve stays with the semi-definite blocks
         let mut try_exact = tolerance.exact;
         let mut may_try = true;
+        let mut doubts = 0;
         for iteration in 0..tolerance.iterations {
             loop {
                 let kind = if try_exact {
@@ -238,8 +263,18 @@ impl Problem<'_> {
                 return Ok(summary);
             }
             if length * reach <= tolerance.displacement {
-                summary.converged = true;
-                return Ok(summary);
+                // where friction sticks in the model but slips in truth the correction is small and
+                // wrong: a small one counts only if it has lowered the force, or if what is left
+                // cannot move anything
+                let (force, reach) = self.remains(x, assembler, &mut work.gradient);
+                if force <= 0.5 * summary.residual
+                    || reach <= UNMOVED * tolerance.displacement
+                    || doubts == DOUBTS
+                {
+                    summary.converged = true;
+                    return Ok(summary);
+                }
+                doubts += 1;
             }
         }
         Ok(summary)
