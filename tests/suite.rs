@@ -62,3 +62,7 @@ mod terms_physics;
 mod tri_garments;
 #[path = "tri_real.rs"]
 mod tri_real;
+#[path = "physics_laws.rs"]
+mod physics_laws;
+#[path = "hard_cases.rs"]
+mod hard_cases;
