@@ -16,6 +16,7 @@ mod c_examples;
 mod capi_contract;
 #[path = "capi_random_calls.rs"]
 mod capi_random_calls;
+mod capi_support;
 #[path = "capi_threads.rs"]
 mod capi_threads;
 #[path = "cli_toile.rs"]
