@@ -1,6 +1,11 @@
 //! Time to solve one Newton system of sewn cloth: sizes x step sizes x solvers. One thread,
 //! thread CPU is not separated from wall time, so run it on a quiet machine.
 //! `cargo bench --bench linear [-- LARGEST_N [SMALLEST_N]]`.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a benchmark may panic"
+)]
 
 #[path = "../tests/linear_cases/mod.rs"]
 mod cases;

@@ -5,6 +5,11 @@
 //! Prints, for ten seeds, after how many Newton iterations the potential energy (zero at the height
 //! of the pins) is within 1 % of that of the sheet draped from its plane. The energy is looked at
 //! after 25, 50, 75, ... iterations. The textile may take 200 and the plate 100.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a benchmark may panic"
+)]
 
 use toile::pattern::Fabric;
 use toile::sim::{DrapeOptions, Settings, Sim, SimOptions};

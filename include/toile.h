@@ -951,7 +951,8 @@ toile_status toile_sim_create(const struct toile_garment *garment,
 /**
  * Makes a simulation from a scene file: garment, bodies, pins, numbers. `utf8` has `length` bytes;
  * files named inside are looked for in `base_dir` (UTF-8, ends with NUL; NULL: the working
- * directory). Free it with toile_sim_free. TOILE_E_PARSE names the key.
+ * directory). Bodies and pins stand where the file has them at its start; motions and the length of
+ * the run are the host's to play. Free it with toile_sim_free. TOILE_E_PARSE names the key.
  */
 toile_status toile_sim_from_scene(const char *utf8,
                                   size_t length,

@@ -1,7 +1,7 @@
 //! The binary interface: exported symbols, struct layouts, constants, version.
+#![allow(clippy::expect_used, reason = "a test may panic")]
 
-mod capi_support;
-use capi_support as support;
+use crate::capi_support as support;
 use std::fmt::Write as _;
 use std::process::Command;
 

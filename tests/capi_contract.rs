@@ -8,8 +8,7 @@
     reason = "the functions under test take the pointers of C; what goes in is in view here"
 )]
 
-mod capi_support;
-use capi_support::scene::*;
+use crate::capi_support::scene::*;
 use std::ffi::{CStr, c_char, c_void};
 use std::ptr;
 use toile::capi::*;
@@ -119,7 +118,7 @@ fn lists_of_this_file_are_complete() {
     listed.extend(["toile_sim_epoch", "toile_sim_time", "toile_sim_free"]);
     listed.extend(["toile_garment_free", "toile_garment_create"]);
     listed.extend(["toile_garment_from_json", "toile_sim_from_scene"]);
-    for name in capi_support::header_functions() {
+    for name in crate::capi_support::header_functions() {
         let of_object = name.starts_with("toile_sim_") || name.starts_with("toile_garment_");
         if of_object && !name.ends_with("_init") {
             assert!(listed.contains(&name.as_str()), "{name} is not tested here");

@@ -2,8 +2,7 @@
 //! errors change nothing. The same bodies run as fuzz targets (`fuzz/`).
 #![allow(clippy::expect_used, clippy::unwrap_used, reason = "a test may panic")]
 
-mod capi_support;
-use capi_support::{calls, scene};
+use crate::capi_support::{calls, scene};
 
 /// The generator SplitMix64: the same bytes everywhere.
 struct Random(u64);

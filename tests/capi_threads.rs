@@ -7,8 +7,7 @@
     reason = "the functions under test take the pointers of C"
 )]
 
-mod capi_support;
-use capi_support::scene::*;
+use crate::capi_support::scene::*;
 use std::ffi::c_void;
 use std::ptr;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};

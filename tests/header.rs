@@ -1,7 +1,7 @@
 //! The committed header is what the sources give, and is written for C readers.
+#![allow(clippy::expect_used, reason = "a test may panic")]
 
-mod capi_support;
-use capi_support as support;
+use crate::capi_support as support;
 
 #[test]
 fn committed_header_is_what_the_sources_give() {

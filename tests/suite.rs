@@ -1,4 +1,5 @@
 //! All tests that can share a process, one module for each file.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may panic")]
 
 #[path = "abi.rs"]
 mod abi;
@@ -16,12 +17,15 @@ mod c_examples;
 mod capi_contract;
 #[path = "capi_random_calls.rs"]
 mod capi_random_calls;
+mod capi_support;
 #[path = "capi_threads.rs"]
 mod capi_threads;
 #[path = "cli_toile.rs"]
 mod cli_toile;
 #[path = "docs.rs"]
 mod docs;
+#[path = "hard_cases.rs"]
+mod hard_cases;
 #[path = "header.rs"]
 mod header;
 #[path = "layering.rs"]
@@ -38,6 +42,8 @@ mod pattern_examples;
 mod pattern_garmentcode;
 #[path = "pattern_materials.rs"]
 mod pattern_materials;
+#[path = "physics_laws.rs"]
+mod physics_laws;
 #[path = "python_driver.rs"]
 mod python_driver;
 #[path = "readout_real_bodies.rs"]
@@ -62,7 +68,3 @@ mod terms_physics;
 mod tri_garments;
 #[path = "tri_real.rs"]
 mod tri_real;
-#[path = "physics_laws.rs"]
-mod physics_laws;
-#[path = "hard_cases.rs"]
-mod hard_cases;

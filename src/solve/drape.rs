@@ -235,11 +235,7 @@ pub fn drape(
     }
     match &carried {
         Some((from, positions)) => transfer(from, positions, engine, state)?,
-        None if flat => {
-            if !sew(engine, state, plan, &mut all, watch)? {
-                return Ok(all);
-            }
-        }
+        None if flat && !sew(engine, state, plan, &mut all, watch)? => return Ok(all),
         None => {}
     }
     let options = settle_options(plan, plan.force_tolerance);

@@ -736,7 +736,7 @@ fn start(world: &mut World) {
     }
 }
 
-/// Reads bytes as a garment and as a scene; what can be read is made and stepped once.
+/// Reads bytes as a garment; what can be read is made and stepped once.
 pub fn read_text(bytes: &[u8]) -> toile_status {
     let text = bytes.as_ptr().cast();
     let (mut garment, mut sim) = (ptr::null_mut(), ptr::null_mut());

@@ -125,10 +125,10 @@ fn read_fabric(node: &Node<'_>, base_dir: Option<&Path>) -> Result<(Fabric, Vec<
     let (mut fabric, notes) =
         fabric_from_json(&text).map_err(|e| e.at(path.display()).at(&node.path))?;
     // measured files carry no name
-    if fabric.name == "measured fabric" {
-        if let Some(stem) = path.file_stem() {
-            fabric.name = stem.to_string_lossy().into_owned();
-        }
+    if fabric.name == "measured fabric"
+        && let Some(stem) = path.file_stem()
+    {
+        fabric.name = stem.to_string_lossy().into_owned();
     }
     Ok((fabric, notes))
 }
