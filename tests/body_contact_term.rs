@@ -88,7 +88,7 @@ fn check(term: &mut dyn Term, case: &Case) {
         let vertices: Vec<usize> = term.stencils().get(e).iter().map(|v| *v as usize).collect();
         let gradient = |x: &[Vec3]| {
             let mut g = vec![Vec3::zeros(); arity];
-            term.gradient(e, &configuration(&x, &case.x, &world), &mut g);
+            term.gradient(e, &configuration(x, &case.x, &world), &mut g);
             g
         };
         let g = gradient(&case.x);

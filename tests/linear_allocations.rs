@@ -1,5 +1,4 @@
 //! Solving again on the same pattern takes no memory.
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may panic")]
 #![allow(clippy::expect_used, reason = "test code")]
 
 mod linear_cases;

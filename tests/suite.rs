@@ -1,5 +1,6 @@
 //! All tests that can share a process, one module for each file.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may panic")]
+#![allow(clippy::duplicate_mod, reason = "every file names the helpers it uses")]
 
 #[path = "abi.rs"]
 mod abi;
