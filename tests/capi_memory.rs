@@ -1,5 +1,4 @@
 //! Objects made and freed leave nothing behind. Alone in its program: it looks at the process.
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may panic")]
 #![allow(
     unsafe_code,
     clippy::undocumented_unsafe_blocks,
