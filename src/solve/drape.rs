@@ -186,6 +186,11 @@ const PROBE_STEP: f64 = 1.0 / 30.0;
 const PROBE_STEPS: usize = 30;
 const QUIET_STEPS: usize = 4;
 
+/// Seams with a larger gap than this are pulled harder [m]; below it they are sewn.
+const NEARLY_CLOSED: f64 = 8e-3;
+/// How often the pull is doubled.
+const DOUBLINGS: usize = 5;
+
 /// A gap at which the seams count as closed [m].
 const CLOSED: f64 = 1e-3;
 
@@ -334,11 +339,37 @@ fn sew(
     let gravity = std::mem::replace(&mut state.gravity, Vec3::zeros());
     let smooth = engine.system.bodies.with_friction(0.0);
     let rough = std::mem::replace(&mut engine.system.bodies, smooth);
-    let done = stage(engine, state, &options, SEW, "sew", all, watch);
+    let settings = engine.settings.clone();
+    let done = close(engine, state, &options, all, watch);
     engine.system.bodies = rough;
     state.gravity = gravity;
     state.body_anchors.clear();
-    Ok(!done?.cancelled)
+    let restored = engine.set_settings(&settings);
+    let done = done?;
+    restored?;
+    Ok(!done.cancelled)
+}
+
+/// Sews with the pull of the settings; a seam that stays open under it, because the garment is
+/// tight there, is pulled twice as hard, and so on.
+fn close(
+    engine: &mut Engine,
+    state: &mut State,
+    options: &RelaxOptions,
+    all: &mut Relaxed,
+    watch: &mut Watch<'_>,
+) -> Result<Relaxed> {
+    let mut settings = engine.settings.clone();
+    let mut done = stage(engine, state, options, SEW, "sew", all, watch)?;
+    for _ in 0..DOUBLINGS {
+        if done.cancelled || engine.system.largest_seam_gap(&state.positions) < NEARLY_CLOSED {
+            break;
+        }
+        settings.seam_pull *= 2.0;
+        engine.set_settings(&settings)?;
+        done = stage(engine, state, options, SEW, "sew", all, watch)?;
+    }
+    Ok(done)
 }
 
 fn stage(
