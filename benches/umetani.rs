@@ -11,7 +11,7 @@
     reason = "a benchmark may panic"
 )]
 
-use toile::pattern::Fabric;
+use toile::pattern::{BendingModel, Fabric};
 use toile::sim::{DrapeOptions, Settings, Sim, SimOptions};
 use toile::tri::grid::{SheetPattern, sheet_garment, structured_sheet};
 
@@ -21,6 +21,7 @@ fn sheet(n: usize, bending: f64) -> Sim {
     let fabric = Fabric {
         bending_warp: bending,
         bending_weft: bending,
+        bending_model: BendingModel::Quadratic,
         ..Fabric::default()
     };
     let mut mesh =

@@ -42,10 +42,14 @@ pub struct Relaxed {
 /// Smallest step of a relaxation before it gives up [s].
 const SMALLEST_STEP: f64 = 1e-6;
 
+/// A correction below this part of the mean edge length counts as near rest.
+const NEAR: f64 = 0.05;
+/// Disturbance of the start over the mean edge length.
+const IMPERFECTION: f64 = 1e-5;
 /// Friction is frozen below this many force tolerances.
 const FREEZE: f64 = 300.0;
 /// Steps after which friction follows only every tenth step.
-const SETTLED: u64 = 200;
+const SETTLED: u64 = 30;
 
 /// Relaxes the state towards rest. `watch(step, residual)` returns false to stop.
 pub fn relax(
@@ -62,11 +66,14 @@ pub fn relax(
     out.totals.residual = f64::INFINITY;
     let mut h = options.first_step;
     let mut kinetic = [0.0; 2];
-    // the exact Hessian pays near rest: it is tried after full steps, less often where it failed
+    // the exact Hessian pays near rest, far from it the way of steepest instability leads astray: it
+    // is tried where little moves, after full steps, less often where it failed
+    let mut moved = f64::INFINITY;
     let (mut wait, mut patience) = (4_u32, 4_u32);
     state.velocities.fill(Vec3::zeros());
+    disturb(state, IMPERFECTION * engine.system.mean_edge());
     while out.totals.substeps < options.max_steps {
-        let exact = wait == 0;
+        let exact = wait == 0 && moved < NEAR * engine.system.mean_edge();
         // near rest friction is frozen while Newton's method converges: anchors that move after
         // every correction would creep
         let follow = out.totals.residual > FREEZE * options.force_tolerance
@@ -82,14 +89,14 @@ pub fn relax(
         };
         out.totals.newton_iterations += u64::from(summary.iterations);
         out.totals.linear_iterations += summary.linear_iterations;
-        if exact && !summary.exact {
+        if exact && summary.exactness < 1.0 {
             patience = (2 * patience).min(64);
-        } else if summary.exact {
+        } else if exact {
             patience = 1;
         }
         wait = if summary.last_length < 1.0 {
             patience
-        } else if summary.exact {
+        } else if summary.exactness == 1.0 {
             0
         } else if exact {
             patience
@@ -113,7 +120,11 @@ pub fn relax(
             continue;
         }
         out.totals.substeps += 1;
+        moved = summary.moved;
         out.totals.residual = summary.static_residual;
+        if h < SMALLEST_STEP {
+            return Ok(out);
+        }
         let energy = kinetic_energy(engine, state);
         if energy < kinetic[0] && kinetic[0] >= kinetic[1] {
             state.velocities.fill(Vec3::zeros());
@@ -146,6 +157,25 @@ pub fn relax(
         }
     }
     Ok(out)
+}
+
+/// Moves every free vertex a little, each in its own direction: a sheet that hangs exactly in its
+/// plane has no force across it, however unstable it is, and would fold within the plane.
+fn disturb(state: &mut State, size: f64) {
+    let mut pins = state.pins.iter().map(|p| p.vertex as usize).peekable();
+    let mut bits = 0x9E37_79B9_7F4A_7C15_u64;
+    for (i, x) in state.positions.iter_mut().enumerate() {
+        let offset = Vec3::from_fn(|_, _| {
+            // xorshift (Marsaglia 2003)
+            bits ^= bits << 13;
+            bits ^= bits >> 7;
+            bits ^= bits << 17;
+            (bits >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+        });
+        if pins.next_if_eq(&i).is_none() {
+            *x += offset * size;
+        }
+    }
 }
 
 fn kinetic_energy(engine: &Engine, state: &State) -> f64 {
@@ -206,6 +236,7 @@ pub fn drape(
     plan: &Plan,
     watch: &mut Watch<'_>,
 ) -> Result<Relaxed> {
+    engine.begin();
     let mut all = Relaxed {
         totals: Totals::default(),
         converged: false,

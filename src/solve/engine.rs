@@ -86,6 +86,11 @@ impl Engine {
         Ok(())
     }
 
+    /// Starts a call of the host: results depend on the state alone, not on what was solved before.
+    pub fn begin(&mut self) {
+        self.linear.forget();
+    }
+
     /// Name of the linear solver.
     pub fn backend(&self) -> &'static str {
         self.linear.name()
@@ -176,13 +181,25 @@ impl Engine {
             } else {
                 0.0
             },
+            relative: if dynamic {
+                self.settings.newton_relative_tolerance
+            } else {
+                0.0
+            },
             force: 0.0,
             iterations: match motion {
                 Motion::Dynamic => self.settings.newton_max_iterations as u32,
                 Motion::Relax { .. } => 1,
             },
             linear: self.settings.linear_tolerance,
-            exact: matches!(motion, Motion::Relax { exact: true, .. }),
+            exactness: f64::from(u8::from(matches!(
+                motion,
+                Motion::Relax { exact: true, .. }
+            ))),
+            most_exactness: f64::from(u8::from(!matches!(
+                motion,
+                Motion::Relax { exact: false, .. }
+            ))),
         };
         let summary = problem.minimise(
             &mut x,
@@ -342,8 +359,12 @@ fn inadmissible(system: &System, at: &Configuration<'_>, dynamic: bool) -> Optio
     for b in 0..bodies.count() {
         let limit = system.depth_limit(b);
         for (x0, x1) in start.iter().zip(x) {
-            let end = bodies.value(b, x1);
-            if end < -limit && bodies.value_at_start(b, x0) > -limit {
+            // the signed distance changes at most as fast as its argument
+            let room = bodies.value_at_start(b, x0) + limit;
+            if room > bodies.travel(b, x0, x1) {
+                continue;
+            }
+            if room > 0.0 && bodies.value(b, x1) < -limit {
                 return Some("a vertex went too deep into a body");
             }
             if bodies.passes_through(b, x0, x1, limit) {

@@ -28,15 +28,18 @@ pub struct Inertia<'a> {
 pub struct Tolerance {
     /// Largest correction of a coordinate's vertex [m].
     pub displacement: f64,
+    /// Decrease of `Phi` in an iteration over that in all of them.
+    pub relative: f64,
     /// Largest force on a free vertex [N].
     pub force: f64,
     /// Newton iterations.
     pub iterations: u32,
     /// Relative residual of the linear solver.
     pub linear: f64,
-    /// Whether the exact Hessian is tried from the first iteration on; otherwise after the first
-    /// full step. Where it is not positive definite the semi-definite blocks take its place.
-    pub exact: bool,
+    /// How much of the exact Hessian is tried in the first iteration, see [`HessianKind`].
+    pub exactness: f64,
+    /// How much of it is tried later.
+    pub most_exactness: f64,
 }
 
 /// How a solve ended.
@@ -55,8 +58,10 @@ pub struct Summary {
     pub static_residual: f64,
     /// Length of the last line search, 1 for a full step, 0 if none was found.
     pub last_length: f64,
-    /// Whether the last correction used the exact Hessian.
-    pub exact: bool,
+    /// Largest displacement in the last correction [m].
+    pub moved: f64,
+    /// How much of the exact Hessian the last correction used.
+    pub exactness: f64,
 }
 
 /// What a Newton solve works on and with.
@@ -184,16 +189,16 @@ impl Problem<'_> {
         if !value.is_finite() {
             return Err(not_finite("energy"));
         }
-        // once the exact Hessian has failed this solve stays with the semi-definite blocks
-        let mut try_exact = tolerance.exact;
-        let mut may_try = true;
+        let mut exactness = tolerance.exactness;
         let mut doubts = 0;
+        let first = value;
         for iteration in 0..tolerance.iterations {
             loop {
-                let kind = if try_exact {
-                    HessianKind::Exact
+                let kept = linear.keeps(assembler.matrix());
+                let kind = if kept {
+                    HessianKind::Part(tolerance.most_exactness)
                 } else {
-                    HessianKind::Psd
+                    HessianKind::Part(exactness)
                 };
                 let still = self.derivatives(x, kind, assembler, &mut work.gradient);
                 summary.residual = largest(&work.gradient);
@@ -211,7 +216,8 @@ impl Problem<'_> {
                     *m = -g;
                 }
                 let matrix = assembler.matrix();
-                let solved = linear.prepare(matrix).and_then(|()| {
+                let prepared = if kept { Ok(()) } else { linear.prepare(matrix) };
+                let solved = prepared.and_then(|()| {
                     linear.solve(
                         matrix,
                         &work.negative,
@@ -222,12 +228,17 @@ impl Problem<'_> {
                 match solved {
                     Ok(iterations) => {
                         summary.linear_iterations += u64::from(iterations);
-                        summary.exact = try_exact;
+                        summary.exactness = kind.exactness();
                         break;
                     }
-                    Err(_) if try_exact => {
-                        try_exact = false;
-                        may_try = false;
+                    // not positive definite: less of the exact Hessian
+                    Err(_) if kept => linear.forget(),
+                    Err(_) if exactness > 0.0 => {
+                        exactness = if exactness > 0.3 {
+                            0.5 * exactness
+                        } else {
+                            0.0
+                        };
                     }
                     Err(error) => return Err(linear_error(error)),
                 }
@@ -241,6 +252,7 @@ impl Problem<'_> {
             // below the rounding of the energy a decrease cannot be seen: trust the correction
             let noise = 1e-13 * value.abs().max(1e-12);
             let mut length = 1.0;
+            let mut gain = 0.0;
             loop {
                 for i in 0..n {
                     work.trial[i] = x[i] + work.direction[i] * length;
@@ -248,6 +260,7 @@ impl Problem<'_> {
                 let trial = self.value(&work.trial);
                 if trial <= value + 1e-4 * length * slope + noise {
                     x.copy_from_slice(&work.trial);
+                    gain = value - trial;
                     value = trial;
                     break;
                 }
@@ -258,8 +271,17 @@ impl Problem<'_> {
                 }
             }
             summary.last_length = length;
-            try_exact = may_try && length >= 1.0;
+            summary.moved = length * reach;
+            exactness = if length < 1.0 {
+                0.0
+            } else {
+                (2.0 * exactness).max(0.25).min(tolerance.most_exactness)
+            };
             if length == 0.0 {
+                return Ok(summary);
+            }
+            if gain <= tolerance.relative * (first - value) {
+                summary.converged = true;
                 return Ok(summary);
             }
             if length * reach <= tolerance.displacement {

@@ -76,6 +76,8 @@ settings! {
     newton_max_iterations: "solver.newton.max_iterations" = 30.0, 1.0, 10_000.0, "1";
     /// A substep has converged when the largest Newton correction, over the substep size, is below this speed.
     newton_velocity_tolerance: "solver.newton.velocity_tolerance" = 1e-3, 1e-12, 1e3, "m/s";
+    /// A substep has also converged when the last Newton iteration has lowered the incremental potential by no more than this part of what all of them have. 0 asks for the velocity tolerance alone.
+    newton_relative_tolerance: "solver.newton.relative_tolerance" = 0.0, 0.0, 0.5, "1";
     /// Smallest substep; below it a step gives up.
     min_step: "solver.step.min" = 1e-7, 1e-12, 1.0, "s";
     /// Largest substep.
@@ -86,10 +88,10 @@ settings! {
     drape_max_steps: "solver.drape.max_steps" = 2000.0, 1.0, 1e7, "1";
     /// Coarse levels used by a drape from the flat panels, 0 for none.
     drape_levels: "solver.drape.levels" = 1.0, 0.0, 4.0, "1";
-    /// Linear solver: 0 chooses by size, 1 sparse Cholesky, 2 conjugate gradients with block Jacobi, 3 with incomplete Cholesky.
-    linear_kind: "solver.linear.kind" = 0.0, 0.0, 3.0, "1";
+    /// Linear solver: 0 chooses for each matrix, 1 sparse Cholesky, 2 conjugate gradients with block Jacobi, 3 with incomplete Cholesky, 4 with the Cholesky factor of an earlier matrix.
+    linear_kind: "solver.linear.kind" = 0.0, 0.0, 4.0, "1";
     /// Relative residual at which conjugate gradients stop.
-    linear_tolerance: "solver.linear.tolerance" = 1e-6, 1e-14, 0.5, "1";
+    linear_tolerance: "solver.linear.tolerance" = 1e-3, 1e-14, 0.5, "1";
     /// Worker threads; results do not depend on it.
     threads: "solver.threads" = 1.0, 1.0, 256.0, "1";
     /// Cloth against cloth contact: 1 on, 0 off.

@@ -22,6 +22,7 @@ pub struct Totals {
 /// Advances the state by exactly `dt` [s], or returns an error with the state untouched.
 pub fn step(engine: &mut Engine, state: &mut State, dt: f64) -> Result<Totals> {
     let saved = state.clone();
+    engine.begin();
     advance(engine, state, dt).inspect_err(|_| state.clone_from(&saved))
 }
 

@@ -87,7 +87,7 @@ impl Assembler {
         for (t, term) in terms.iter().enumerate() {
             let stencils = term.stencils();
             let (count, arity) = (stencils.count(), stencils.arity);
-            if count == 0 {
+            if count == 0 || term.is_idle(at) {
                 continue;
             }
             let block_count = arity * (arity + 1) / 2;
@@ -109,7 +109,9 @@ impl Assembler {
                         out[*v as usize] += g;
                     }
                 }
-                let Some(kind) = hessian else { continue };
+                let Some(kind) = hessian.filter(|_| !term.is_linear()) else {
+                    continue;
+                };
                 let buffer = &mut self.blocks[..batch * block_count];
                 workers.chunks(buffer, CHUNK * block_count, |c, chunk| {
                     for (k, h) in chunk.chunks_mut(block_count).enumerate() {
@@ -134,6 +136,7 @@ impl Assembler {
 pub fn energy(terms: &[Box<dyn Term>], at: &Configuration<'_>, workers: &Workers) -> f64 {
     terms
         .iter()
+        .filter(|term| !term.is_idle(at))
         .map(|term| workers.sum(term.stencils().count(), |e| term.value(e, at)))
         .sum()
 }

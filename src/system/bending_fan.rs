@@ -110,7 +110,9 @@ pub(super) fn rigidity(f: &Fabric) -> Vec3 {
 /// neighbours: a hinge as in [`crate::math::geometry`].
 fn local_hinge(k: usize, ring: usize, kind: FanKind) -> [usize; 4] {
     let at = if kind == FanKind::Closed { k } else { k + 1 };
-    [0, 1 + at, 1 + (at + 1) % ring, 1 + (at + ring - 1) % ring]
+    let next = if at + 1 == ring { 0 } else { at + 1 };
+    let previous = if at == 0 { ring - 1 } else { at - 1 };
+    [0, 1 + at, 1 + next, 1 + previous]
 }
 
 /// `W` of a fan.

@@ -110,6 +110,17 @@ impl BodySet {
         }
     }
 
+    /// Length of the path of a point over the substep, seen from the body; infinite for a body that
+    /// changes its shape.
+    pub fn travel(&self, body: usize, x0: &Vec3, x: &Vec3) -> f64 {
+        let entry = &self.entries[body];
+        if entry.start_vertices == entry.end_vertices {
+            (entry.to.to_body(x) - entry.from.to_body(x0)).norm()
+        } else {
+            f64::INFINITY
+        }
+    }
+
     /// Signed distance at the start of the substep.
     pub fn value_at_start(&self, body: usize, point: &Vec3) -> f64 {
         let entry = &self.entries[body];

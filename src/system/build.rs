@@ -95,6 +95,11 @@ impl System {
         (2.0 * self.bodies.contact(body).thickness).max(4e-3)
     }
 
+    /// Mean rest length of the edges [m].
+    pub fn mean_edge(&self) -> f64 {
+        self.rest_lengths.iter().sum::<f64>() / self.rest_lengths.len().max(1) as f64
+    }
+
     /// Largest change of an edge's relative length between two configurations.
     pub fn largest_stretch_change(&self, start: &[Vec3], x: &[Vec3]) -> f64 {
         self.edges

@@ -51,6 +51,10 @@ impl Term for Gravity {
         "gravity"
     }
 
+    fn is_linear(&self) -> bool {
+        true
+    }
+
     fn stencils(&self) -> Stencils<'_> {
         Stencils {
             arity: 3,

@@ -30,7 +30,8 @@ pub struct Hinge {
 
 fn gather(fan: &FanRest, k: usize, vertices: &[u32], x: &[Vec3]) -> ([usize; 4], [Vec3; 4]) {
     let local = fan.local_hinge(k);
-    (local, local.map(|i| x[vertices[i] as usize]))
+    let at = |i: usize| x[vertices[local[i]] as usize];
+    (local, [at(0), at(1), at(2), at(3)])
 }
 
 impl Hinge {
@@ -177,10 +178,11 @@ impl Term for Hinge {
                 out[i * (i + 1) / 2 + j] = left * b[j];
             }
         }
-        if kind == HessianKind::Psd {
+        let exactness = kind.exactness();
+        if exactness == 0.0 {
             return;
         }
-        let moment = self.moment(e, at);
+        let moment = self.moment(e, at) * exactness;
         for k in 0..fan.hinge_count() {
             let (local, x) = gather(fan, k, vertices, at.x);
             let f = weights[k].dot(&moment);

@@ -180,10 +180,9 @@ impl Term for Membrane {
         let element = &self.elements[e];
         let f = self.deformation(e, at.x);
         let (_, _, stress) = self.state(e, &f, at);
-        let s = match kind {
-            HessianKind::Psd => project2(&tensor(&stress)),
-            HessianKind::Exact => tensor(&stress),
-        };
+        let full = tensor(&stress);
+        let positive = project2(&full);
+        let s = positive + (full - positive) * kind.exactness();
         let c = element.stiffness * (element.area * (1.0 + element.damping * at.inv_dt));
         let g = shape_gradients(&element.inverse);
         let (f1, f2) = (f.column(0), f.column(1));

@@ -35,6 +35,14 @@ impl Term for Pressure {
         "pressure"
     }
 
+    fn is_idle(&self, at: &Configuration<'_>) -> bool {
+        at.world.pressure == 0.0
+    }
+
+    fn is_linear(&self) -> bool {
+        true
+    }
+
     fn stencils(&self) -> Stencils<'_> {
         Stencils {
             arity: 3,

@@ -373,8 +373,10 @@ impl Term for SeamHinge {
                 out[i * (i + 1) / 2 + j] = g[i] * g[j].transpose() * k;
             }
         }
-        if kind == HessianKind::Exact {
-            let (h, moment) = (dihedral_hessian(&x, hinge.floor), self.moment(e, at));
+        let exactness = kind.exactness();
+        if exactness > 0.0 {
+            let moment = self.moment(e, at) * exactness;
+            let h = dihedral_hessian(&x, hinge.floor);
             for i in 0..4 {
                 for j in 0..=i {
                     out[i * (i + 1) / 2 + j] += h[i][j] * moment;

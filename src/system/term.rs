@@ -14,12 +14,25 @@ pub const MAX_ARITY: usize = 16;
 pub const MAX_BLOCKS: usize = MAX_ARITY * (MAX_ARITY + 1) / 2;
 
 /// Which second derivative is wanted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum HessianKind {
-    /// Positive semi-definite blocks, for Newton.
+    /// Positive semi-definite blocks.
     Psd,
-    /// The exact second derivative, for sensitivities.
+    /// The exact second derivative.
     Exact,
+    /// Between the two: the semi-definite blocks and this part (0 to 1) of what they leave out.
+    Part(f64),
+}
+
+impl HessianKind {
+    /// Part of what the semi-definite blocks leave out: 0 for them, 1 for the exact derivative.
+    pub fn exactness(self) -> f64 {
+        match self {
+            Self::Psd => 0.0,
+            Self::Exact => 1.0,
+            Self::Part(part) => part,
+        }
+    }
 }
 
 /// Where energies are evaluated.
@@ -138,6 +151,15 @@ pub trait Term: Send + Sync {
     ) {
         let _ = (e, at, change);
         out.fill(Vec3::zeros());
+    }
+    /// Whether the term is zero in this configuration's world, wherever the vertices are.
+    fn is_idle(&self, at: &Configuration<'_>) -> bool {
+        let _ = at;
+        false
+    }
+    /// Whether the energy is linear, so that there is no Hessian.
+    fn is_linear(&self) -> bool {
+        false
     }
     /// Whether the energy is internal: no net force, invariant under rotation and translation.
     fn is_internal(&self) -> bool {

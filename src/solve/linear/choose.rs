@@ -1,25 +1,25 @@
 //! Which linear solver.
 //!
-//! The crossover was measured by `benches/linear.rs` on sewn cloth (time to a relative residual of
-//! 1e-6 without the symbolic analysis, one core of an AMD Zen 3). With `rho` the stiffness of a
-//! vertex over its mass by the squared step, IC(0) against Cholesky takes
+//! Newton's directions are wanted to a relative residual of 1e-2. With `rho` the stiffness of a vertex
+//! over its mass by the squared step, measured on cloth in motion and in drapes:
 //!
-//! | vertices | rho, ms against ms | | |
-//! |---|---|---|---|
-//! | 1 600 | 16: 2.3, 5.4 | 140: 6.6, 5.6 | 1 600: 13, 10 |
-//! | 4 800 | 50: 11, 36 | 430: 28, 44 | 4 800: 55, 43 |
-//! | 10 000 | 100: 41, 134 | 900: 97, 148 | 10 000: 286, 149 |
-//! | 30 000 | 300: 284, 817 | 2 700: 2 060, 813 | 30 000: 4 100, 691 |
+//! * small `rho` (time steps): conjugate gradients with IC(0) take 10 to 30 iterations; a new
+//!   incomplete factor costs little and follows every change;
+//! * large `rho` (statics): their number grows without bound, while the complete factor of an earlier
+//!   matrix keeps it below 15.
 //!
-//! so that iterating wins by a fair margin where `rho < 700 min(1, (n / 5000)^1.7)`: for a shirt of
-//! 10^4 vertices, up to steps of about 3 ms.
+//! On a sheet of 1 600 vertices falling over a sphere with steps of 10 ms (`rho` = 2 400) IC(0) took
+//! 4.0 s and kept factors 5.5 s, on 10 000 vertices (`rho` = 12 000) both the same; in the relaxation
+//! of a shirt of 9 600 vertices (`rho` above 1e5 for most steps) 102 s and 57 s.
 //!
 //! `rho` is read off the matrix: internal stiffness has zero row sums, so what a row's blocks sum
 //! to is its mass term, and `rho` is the median over vertices of trace(diagonal block) over
 //! trace(row sum). Vertices held by a body count as heavy ones, the median ignores them while they
-//! are few. The choice is a function of the matrix alone, so a restored run takes the same.
+//! are few. The choice is a function of the matrices since the last [`LinearSolver::forget`], so that a
+//! restored run takes the same.
 
 use super::direct::Direct;
+use super::factored::StiffFactor;
 use super::ic0::{IncompleteCholesky, Order, Storage};
 use super::jacobi::BlockJacobi;
 use super::pcg::ConjugateGradients;
@@ -27,20 +27,15 @@ use super::{LinearError, LinearSolver};
 use crate::math::block::BlockMatrix;
 use crate::math::{Mat3, Vec3};
 
-/// Stiffness over mass below which iterating wins on large garments.
-const CROSSOVER_RATIO: f64 = 700.0;
-/// Vertices below which the direct solver gains.
-const CROSSOVER_VERTICES: f64 = 5_000.0;
-/// How fast it gains.
-const CROSSOVER_EXPONENT: f64 = 1.7;
+/// Stiffness over mass below which incomplete factors are enough.
+const CROSSOVER_RATIO: f64 = 2e4;
 
-/// Vertices below which either takes less than some milliseconds and Cholesky is not worth
-/// comparing.
-const ALWAYS_DIRECT: usize = 800;
+/// Vertices below which a Cholesky factor takes about a millisecond.
+const ALWAYS_DIRECT: usize = 300;
 
 /// A solver by its number in the settings, for `n` block rows: 0 chooses for each matrix, 1 sparse
-/// Cholesky, 2 conjugate gradients with block Jacobi, 3 with incomplete Cholesky. Other numbers are
-/// taken as 0: the settings refuse them at the door.
+/// Cholesky, 2 conjugate gradients with block Jacobi, 3 with incomplete Cholesky, 4 with the factor
+/// of an earlier matrix. Other numbers are taken as 0: the settings refuse them at the door.
 ///
 /// `priorities` (see [`super::ordering`]), one for each block row, mark the vertices of seams for
 /// the incomplete factorization.
@@ -49,9 +44,14 @@ pub fn solver(kind: u32, n: usize, priorities: Option<&[u8]>) -> Box<dyn LinearS
         1 => Box::new(Direct::new()),
         2 => Box::new(ConjugateGradients::new(Box::new(BlockJacobi::new()))),
         3 => Box::new(incomplete(priorities)),
+        4 => Box::new(factored()),
         _ if n < ALWAYS_DIRECT => Box::new(Direct::new()),
         _ => Box::new(Automatic::new(priorities)),
     }
+}
+
+fn factored() -> ConjugateGradients {
+    ConjugateGradients::new(Box::new(StiffFactor::default())).for_newton()
 }
 
 fn incomplete(priorities: Option<&[u8]>) -> ConjugateGradients {
@@ -62,13 +62,21 @@ fn incomplete(priorities: Option<&[u8]>) -> ConjugateGradients {
     ConjugateGradients::new(Box::new(IncompleteCholesky::new(order, Storage::F64)))
 }
 
-/// Chooses for each matrix; what does not converge is solved directly.
+/// Chooses for each matrix; what the others refuse is solved directly.
 pub struct Automatic {
     direct: Direct,
-    iterative: ConjugateGradients,
-    iterates: bool,
+    incomplete: ConjugateGradients,
+    factored: ConjugateGradients,
+    chosen: Choice,
     ratios: Vec<f64>,
     sums: Vec<Mat3>,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Choice {
+    Direct,
+    Incomplete,
+    Factored,
 }
 
 impl Automatic {
@@ -76,10 +84,19 @@ impl Automatic {
     pub fn new(priorities: Option<&[u8]>) -> Self {
         Self {
             direct: Direct::new(),
-            iterative: incomplete(priorities),
-            iterates: false,
+            incomplete: incomplete(priorities),
+            factored: factored(),
+            chosen: Choice::Direct,
             ratios: Vec::new(),
             sums: Vec::new(),
+        }
+    }
+
+    fn chosen(&self) -> &dyn LinearSolver {
+        match self.chosen {
+            Choice::Direct => &self.direct,
+            Choice::Incomplete => &self.incomplete,
+            Choice::Factored => &self.factored,
         }
     }
 
@@ -109,27 +126,32 @@ impl Automatic {
     }
 }
 
-/// Whether iterating is the faster way for this size and stiffness ratio.
-pub fn iterates(n: usize, ratio: f64) -> bool {
-    let size = (n as f64 / CROSSOVER_VERTICES).min(1.0);
-    ratio < CROSSOVER_RATIO * size.powf(CROSSOVER_EXPONENT)
-}
-
 impl LinearSolver for Automatic {
     fn name(&self) -> &'static str {
-        if self.iterates {
-            self.iterative.name()
-        } else {
-            self.direct.name()
-        }
+        self.chosen().name()
+    }
+
+    fn keeps(&self, matrix: &BlockMatrix) -> bool {
+        self.chosen().keeps(matrix)
+    }
+
+    fn forget(&mut self) {
+        self.factored.forget();
+        self.chosen = Choice::Direct;
     }
 
     fn prepare(&mut self, matrix: &BlockMatrix) -> Result<(), LinearError> {
-        let ratio = self.stiffness_ratio(matrix);
-        self.iterates = iterates(matrix.n(), ratio) && self.iterative.prepare(matrix).is_ok();
-        if self.iterates {
+        if self.stiffness_ratio(matrix) < CROSSOVER_RATIO {
+            self.chosen = Choice::Incomplete;
+            if self.incomplete.prepare(matrix).is_ok() {
+                return Ok(());
+            }
+        }
+        self.chosen = Choice::Factored;
+        if self.factored.prepare(matrix).is_ok() {
             return Ok(());
         }
+        self.chosen = Choice::Direct;
         self.direct.prepare(matrix)
     }
 
@@ -140,21 +162,25 @@ impl LinearSolver for Automatic {
         x: &mut [Vec3],
         tolerance: f64,
     ) -> Result<u32, LinearError> {
-        if self.iterates {
-            match self.iterative.solve(matrix, b, x, tolerance) {
-                Err(LinearError::NoConvergence) => {
-                    self.iterates = false;
-                    self.direct.prepare(matrix)?;
-                }
-                done => return done,
+        let solved = match self.chosen {
+            Choice::Direct => return self.direct.solve(matrix, b, x, tolerance),
+            Choice::Incomplete => self.incomplete.solve(matrix, b, x, tolerance),
+            Choice::Factored => self.factored.solve(matrix, b, x, tolerance),
+        };
+        match solved {
+            Err(LinearError::NoConvergence) => {
+                self.chosen = Choice::Direct;
+                self.direct.prepare(matrix)?;
+                self.direct.solve(matrix, b, x, tolerance)
             }
+            done => done,
         }
-        self.direct.solve(matrix, b, x, tolerance)
     }
 
     fn bytes(&self) -> usize {
         self.direct.bytes()
-            + self.iterative.bytes()
+            + self.incomplete.bytes()
+            + self.factored.bytes()
             + 8 * self.ratios.len()
             + size_of::<Mat3>() * self.sums.len()
     }

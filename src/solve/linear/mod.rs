@@ -1,12 +1,15 @@
 //! Linear systems `A x = b` with symmetric positive definite block-sparse `A`, behind one trait.
 //!
 //! * [`direct`]: supernodal Cholesky, ordered by approximate minimum degree on the block graph.
-//! * [`pcg`]: conjugate gradients with a [`pcg::Preconditioner`]: [`jacobi`] (3x3 diagonal blocks)
-//!   or [`ic0`] (incomplete Cholesky on the pattern of `A`, in an [`ordering`]).
+//! * [`pcg`]: conjugate gradients with a [`pcg::Preconditioner`]: [`jacobi`] (3x3 diagonal blocks),
+//!   [`ic0`] (incomplete Cholesky on the pattern of `A`, in an [`ordering`]) or [`factored`] (the
+//!   complete factor of an earlier matrix).
 //! * [`choose`]: which of them, by number or by measured crossover.
 
+mod cholesky;
 pub mod choose;
 pub mod direct;
+pub mod factored;
 pub mod ic0;
 pub mod jacobi;
 pub mod ordering;
@@ -30,7 +33,16 @@ pub trait LinearSolver: Send {
     fn name(&self) -> &'static str;
     /// Takes a new matrix. Reuses the symbolic analysis while the pattern stays the same.
     fn prepare(&mut self, matrix: &BlockMatrix) -> Result<(), LinearError>;
-    /// Solves for `x` (whose content on entry is ignored), `matrix` being the one last prepared.
+    /// Whether `solve` may be called with this matrix although an earlier one was prepared.
+    fn keeps(&self, matrix: &BlockMatrix) -> bool {
+        let _ = matrix;
+        false
+    }
+    /// Drops what depends on the values of earlier matrices: the next solution is that of a new
+    /// solver, bit for bit.
+    fn forget(&mut self) {}
+    /// Solves for `x` (whose content on entry is ignored), `matrix` being the one last prepared, or
+    /// one that it [keeps](Self::keeps) for.
     /// Returns the iterations taken; a direct solve counts one.
     fn solve(
         &mut self,

@@ -10,7 +10,7 @@
 
 use super::{LinearError, LinearSolver};
 use crate::math::Vec3;
-use crate::math::block::BlockMatrix;
+use crate::math::block::{BlockMatrix, BlockPattern};
 
 /// An approximation of the inverse, symmetric and positive definite.
 pub trait Preconditioner: Send {
@@ -18,10 +18,24 @@ pub trait Preconditioner: Send {
     fn solver_name(&self) -> &'static str;
     /// Takes a new matrix. Keeps what depends on the pattern alone while that stays the same.
     fn prepare(&mut self, matrix: &BlockMatrix) -> Result<(), LinearError>;
+    /// Drops what was decided by the values of earlier matrices.
+    fn forget(&mut self) {}
     /// `z = M^-1 r` for the matrix last prepared.
     fn apply(&mut self, r: &[Vec3], z: &mut [Vec3]);
     /// Bytes held.
     fn bytes(&self) -> usize;
+}
+
+/// Iterations up to which a preconditioner is kept for the next matrix.
+const KEPT: u32 = 15;
+/// Iterations after which a solution of a series is taken as it is.
+const ENOUGH: u32 = 60;
+
+/// State of a solver for the slowly changing matrices of Newton's method.
+#[derive(Clone, Debug, Default)]
+struct Series {
+    /// Pattern of the matrix that the preconditioner was made for, while it is good enough.
+    prepared: Option<BlockPattern>,
 }
 
 /// Times that a drifted iteration is restarted from the true residual.
@@ -31,6 +45,8 @@ const RESTARTS: u32 = 10;
 pub struct ConjugateGradients {
     preconditioner: Box<dyn Preconditioner>,
     limit: Option<u32>,
+    /// What is kept for a series of matrices.
+    series: Option<Series>,
     r: Vec<Vec3>,
     z: Vec<Vec3>,
     p: Vec<Vec3>,
@@ -43,11 +59,22 @@ impl ConjugateGradients {
         Self {
             preconditioner,
             limit: None,
+            series: None,
             r: Vec::new(),
             z: Vec::new(),
             p: Vec::new(),
             q: Vec::new(),
         }
+    }
+
+    /// For the directions of Newton's method: the preconditioner is kept for later matrices of the
+    /// same pattern while the iterations stay few, and an iteration that is long or meets negative
+    /// curvature ends with what it has, a direction of descent (Steihaug 1983).
+    #[must_use]
+    pub fn for_newton(mut self) -> Self {
+        self.series = Some(Series::default());
+        self.limit = Some(ENOUGH);
+        self
     }
 
     /// The same with its own iteration limit.
@@ -67,7 +94,22 @@ impl LinearSolver for ConjugateGradients {
         for work in [&mut self.r, &mut self.z, &mut self.p, &mut self.q] {
             work.resize(matrix.n(), Vec3::zeros());
         }
-        self.preconditioner.prepare(matrix)
+        self.discard();
+        self.preconditioner.prepare(matrix)?;
+        if let Some(series) = &mut self.series {
+            series.prepared = Some(matrix.pattern.clone());
+        }
+        Ok(())
+    }
+
+    fn keeps(&self, matrix: &BlockMatrix) -> bool {
+        let prepared = self.series.as_ref().and_then(|s| s.prepared.as_ref());
+        prepared.is_some_and(|pattern| *pattern == matrix.pattern)
+    }
+
+    fn forget(&mut self) {
+        self.preconditioner.forget();
+        self.discard();
     }
 
     fn solve(
@@ -95,7 +137,19 @@ impl LinearSolver for ConjugateGradients {
         self.r.copy_from_slice(b);
         let mut iterations = 0;
         for _ in 0..=RESTARTS {
-            self.iterate(matrix, x, goal, limit, &mut iterations)?;
+            let done = self.iterate(matrix, x, goal, limit, &mut iterations);
+            if self.series.is_some() {
+                if iterations > KEPT {
+                    self.discard();
+                }
+                let direction = x.iter().any(|v| *v != Vec3::zeros());
+                let finite = dot(x, x).is_finite();
+                return match done {
+                    Err(_) if direction && finite => Ok(iterations),
+                    done => done.map(|()| iterations),
+                };
+            }
+            done?;
             matrix.multiply(x, &mut self.q);
             for i in 0..n {
                 self.r[i] = b[i] - self.q[i];
@@ -113,6 +167,13 @@ impl LinearSolver for ConjugateGradients {
 }
 
 impl ConjugateGradients {
+    /// The next matrix is prepared anew.
+    fn discard(&mut self) {
+        if let Some(series) = &mut self.series {
+            series.prepared = None;
+        }
+    }
+
     /// Iterates from `x` with residual `self.r` until the recursive residual meets the goal.
     fn iterate(
         &mut self,
@@ -137,6 +198,9 @@ impl ConjugateGradients {
                 return Err(LinearError::NoConvergence);
             }
             if curvature <= 0.0 || rz <= 0.0 {
+                if *iterations == 1 && rz > 0.0 {
+                    x.copy_from_slice(&self.p);
+                }
                 return Err(LinearError::NotPositiveDefinite);
             }
             let alpha = rz / curvature;

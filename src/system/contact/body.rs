@@ -4,28 +4,30 @@
 //! stiffness [Pa/m], `k = c A` [N/m]:
 //!
 //! ```text
-//! normal     k/2 (t - d)^2                         where d < t
-//! friction   k/2 |u|^2          where k |u| <= mu lambda     (stick)
-//!            mu lambda |u| - (mu lambda)^2 / 2k    beyond    (slip)
+//! V = k/2 (t - d)^2   where d < t
 //! ```
 //!
-//! `u = P (x - a)` is the tangential distance to the anchor `a`, `P` projects on the tangent plane
-//! at the start of the step, `lambda` is the normal force of the last accepted step (Hasegawa et
-//! al. 2003; Umetani et al. 2011, section 7). The anchor rides on the body. After an accepted step
-//! a slipping anchor is drawn along to the distance `mu lambda / k`.
+//! Friction is that of [`friction`](super::friction); its anchor rides on the body, its plane is the
+//! tangent plane at the start of the step.
 
 use super::super::state::{BodyAnchor, State};
 use super::super::term::{Configuration, HessianKind, Stencils, Term};
+use super::friction::{Friction, kept};
 use crate::cloth::Cloth;
 use crate::math::{Mat3, Vec3};
 
-/// Lagged friction of one vertex on one body.
+/// Friction of one vertex on one body.
 #[derive(Clone, Copy, Debug)]
-struct Friction {
+struct Rub {
     body: u32,
     anchor: Vec3,
-    normal: Vec3,
-    limit: f64,
+    friction: Friction,
+}
+
+impl Rub {
+    fn slip(&self, x: &Vec3) -> Vec3 {
+        self.friction.slip(&(x - self.anchor))
+    }
 }
 
 /// Contact of every vertex with every body.
@@ -37,8 +39,8 @@ pub struct BodyContact {
     clearance: Vec<f64>,
     body_count: usize,
     /// CSR by vertex.
-    friction_starts: Vec<u32>,
-    friction: Vec<Friction>,
+    rub_starts: Vec<u32>,
+    rubs: Vec<Rub>,
 }
 
 impl BodyContact {
@@ -50,8 +52,8 @@ impl BodyContact {
             areas: cloth.vertex_areas.clone(),
             clearance: Vec::new(),
             body_count: 0,
-            friction_starts: vec![0; n + 1],
-            friction: Vec::new(),
+            rub_starts: vec![0; n + 1],
+            rubs: Vec::new(),
         }
     }
 
@@ -64,14 +66,9 @@ impl BodyContact {
         (0..self.body_count).filter(move |b| moved >= self.clearance[e * self.body_count + b])
     }
 
-    fn frictions(&self, e: usize) -> &[Friction] {
-        &self.friction[self.friction_starts[e] as usize..self.friction_starts[e + 1] as usize]
+    fn rubs(&self, e: usize) -> &[Rub] {
+        &self.rubs[self.rub_starts[e] as usize..self.rub_starts[e + 1] as usize]
     }
-}
-
-/// Tangential part of a vector.
-fn tangential(normal: &Vec3, v: &Vec3) -> Vec3 {
-    v - normal * normal.dot(v)
 }
 
 impl Term for BodyContact {
@@ -101,14 +98,8 @@ impl Term for BodyContact {
                 sum += 0.5 * contact.stiffness * self.areas[e] * depth * depth;
             }
         }
-        for f in self.frictions(e) {
-            let k = bodies.contact(f.body as usize).stiffness * self.areas[e];
-            let u = tangential(&f.normal, &(x - f.anchor)).norm();
-            sum += if k * u <= f.limit {
-                0.5 * k * u * u
-            } else {
-                f.limit * u - 0.5 * f.limit * f.limit / k
-            };
+        for rub in self.rubs(e) {
+            sum += rub.friction.energy(&rub.slip(x));
         }
         sum
     }
@@ -125,15 +116,8 @@ impl Term for BodyContact {
                 g -= d.gradient * (contact.stiffness * self.areas[e] * depth);
             }
         }
-        for f in self.frictions(e) {
-            let k = bodies.contact(f.body as usize).stiffness * self.areas[e];
-            let u = tangential(&f.normal, &(x - f.anchor));
-            let length = u.norm();
-            g += if k * length <= f.limit {
-                u * k
-            } else {
-                u * (f.limit / length)
-            };
+        for rub in self.rubs(e) {
+            g += rub.friction.force(&rub.slip(x));
         }
         out[0] = g;
     }
@@ -149,22 +133,14 @@ impl Term for BodyContact {
             if depth > 0.0 {
                 let k = contact.stiffness * self.areas[e];
                 h += d.gradient * d.gradient.transpose() * k;
-                if kind == HessianKind::Exact {
-                    h -= d.hessian * (k * depth);
+                let exactness = kind.exactness();
+                if exactness > 0.0 {
+                    h -= d.hessian * (k * depth * exactness);
                 }
             }
         }
-        for f in self.frictions(e) {
-            let k = bodies.contact(f.body as usize).stiffness * self.areas[e];
-            let u = tangential(&f.normal, &(x - f.anchor));
-            let length = u.norm();
-            let plane = Mat3::identity() - f.normal * f.normal.transpose();
-            if k * length <= f.limit {
-                h += plane * k;
-            } else {
-                let t = u / length;
-                h += (plane - t * t.transpose()) * (f.limit / length);
-            }
+        for rub in self.rubs(e) {
+            h += rub.friction.hessian(&rub.slip(x));
         }
         out[0] = h;
     }
@@ -179,27 +155,30 @@ impl Term for BodyContact {
                     .push(bodies.value(b, x) - bodies.contact(b).thickness);
             }
         }
-        self.friction.clear();
-        self.friction_starts.fill(0);
+        self.rubs.clear();
+        self.rub_starts.fill(0);
         for anchor in &state.body_anchors {
-            let mu = bodies.contact(anchor.body as usize).friction;
-            if mu <= 0.0 || anchor.normal_force <= 0.0 {
-                continue;
-            }
-            let d = bodies.distance(anchor.body as usize, &at.x0[anchor.vertex as usize]);
+            let (vertex, body) = (anchor.vertex as usize, anchor.body as usize);
+            let contact = bodies.contact(body);
+            let d = bodies.distance(body, &at.x0[vertex]);
             let Some(normal) = d.gradient.try_normalize(1e-12) else {
                 continue;
             };
-            self.friction_starts[anchor.vertex as usize + 1] += 1;
-            self.friction.push(Friction {
+            let bound = contact.friction * anchor.normal_force;
+            let Some(friction) =
+                Friction::new(normal, bound, contact.stiffness * self.areas[vertex])
+            else {
+                continue;
+            };
+            self.rub_starts[vertex + 1] += 1;
+            self.rubs.push(Rub {
                 body: anchor.body,
-                anchor: bodies.carried(anchor.body as usize, &anchor.point),
-                normal,
-                limit: mu * anchor.normal_force,
+                anchor: bodies.carried(body, &anchor.point),
+                friction,
             });
         }
         for v in 0..self.vertices.len() {
-            self.friction_starts[v + 1] += self.friction_starts[v];
+            self.rub_starts[v + 1] += self.rub_starts[v];
         }
         false
     }
@@ -221,14 +200,8 @@ impl Term for BodyContact {
                 let d = at.world.bodies.distance(body, x);
                 f -= d.gradient * (k * (contact.thickness - d.value).max(0.0));
             }
-            for friction in self.frictions(e).iter().filter(|f| f.body as usize == body) {
-                let u = tangential(&friction.normal, &(x - friction.anchor));
-                let length = u.norm();
-                f += if k * length <= friction.limit {
-                    u * k
-                } else {
-                    u * (friction.limit / length)
-                };
+            for rub in self.rubs(e).iter().filter(|r| r.body as usize == body) {
+                f += rub.friction.force(&rub.slip(x));
             }
             *force += f;
             *torque += (x - origin).cross(&f);
@@ -249,17 +222,14 @@ impl Term for BodyContact {
                 }
                 let k = contact.stiffness * self.areas[e];
                 let normal_force = k * depth * d.gradient.norm();
-                let point = match self.frictions(e).iter().find(|f| f.body as usize == b) {
-                    Some(f) => {
-                        let normal = d.gradient.try_normalize(1e-12).unwrap_or(f.normal);
-                        let u = tangential(&normal, &(x - f.anchor));
-                        let reach = contact.friction * normal_force / k;
-                        let length = u.norm();
-                        if length <= reach {
-                            x - u
-                        } else {
-                            x - u * (reach / length)
-                        }
+                let point = match self.rubs(e).iter().find(|r| r.body as usize == b) {
+                    Some(rub) => {
+                        let offset = x - rub.anchor;
+                        let slip = match d.gradient.try_normalize(1e-12) {
+                            Some(normal) => offset - normal * normal.dot(&offset),
+                            None => rub.slip(&x),
+                        };
+                        x - kept(&slip, contact.friction * normal_force, k)
                     }
                     None => x,
                 };

@@ -119,8 +119,9 @@ impl Term for EdgeContact {
             let (k, depth) = self.depth(e, b, at, d.value);
             if depth > 0.0 {
                 h += d.gradient * d.gradient.transpose() * k;
-                if kind == HessianKind::Exact {
-                    h -= d.hessian * (k * depth);
+                let exactness = kind.exactness();
+                if exactness > 0.0 {
+                    h -= d.hessian * (k * depth * exactness);
                 }
             }
         }

@@ -3,6 +3,7 @@
 pub mod body;
 pub mod crossing;
 pub mod edge;
+mod friction;
 pub mod self_contact;
 pub mod spheres;
 pub mod travel;

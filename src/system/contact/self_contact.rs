@@ -6,14 +6,10 @@
 //!   mean of the two vertex areas. The force is continuous. Exact Hessian by `x_b`:
 //!   `k n n^T - k (d0 - d) / d (I - n n^T)`; the second part is never positive and is left out of the
 //!   semi-definite one.
-//! * Friction (moving anchors, Hasegawa et al. 2003, as in Umetani et al. 2011, section 7): with the
-//!   tangential offset from the anchor `s = (I - n0 n0^T) (x_b - x_a - o)`, a spring `k |s|^2 / 2` up
-//!   to the force `f = mu lambda`, beyond it `f |s| - f^2 / (2 k)`. The direction `n0`, the normal
-//!   force `lambda` and the anchor `o` are those of the start of the step (lagged, so this is a
-//!   convex potential within the step). After an accepted step the anchor is drawn along so far
-//!   that the spring's force is at most `mu lambda`. A pair rubs from its second step on. The
-//!   anchor does not turn with the cloth: a fold turning as a whole feels friction up to the same
-//!   bound.
+//! * Friction is that of [`friction`](super::friction), with the tangential offset
+//!   `s = (I - n0 n0^T) (x_b - x_a - o)` from the anchor `o` and the direction `n0` at the start of the
+//!   step. A pair rubs from its second step on. The anchor does not turn with the cloth: a fold
+//!   turning as a whole feels friction up to the same bound.
 //!
 //! `c` is zero except for pairs that meet in a plane: coincident panels have no side to be pushed
 //! to. Then `c` points along the outside normal of the cloth at `a` (or against it, where `b` already
@@ -23,6 +19,7 @@
 //! bumps of the order of the square of the edge length over the radius. Layers lie `d0` apart at
 //! most. Crossed cloth is not uncrossed.
 
+use super::friction::{Friction, kept};
 use super::spheres::{Grid, Spheres};
 use super::travel;
 use crate::cloth::Cloth;
@@ -49,11 +46,9 @@ struct Pair {
     bias: Vec3,
     /// `n0`, at the start of the step.
     normal: Vec3,
-    /// `o` [m], meaningful if `rubs`.
+    /// `o` [m].
     anchor: Vec3,
-    /// `mu lambda` [N].
-    bound: f64,
-    rubs: bool,
+    friction: Option<Friction>,
 }
 
 /// The term.
@@ -135,11 +130,14 @@ impl SelfContact {
         x[self.stencils[2 * e + 1] as usize] - x[self.stencils[2 * e] as usize]
     }
 
-    /// Tangential offset from the anchor.
-    fn slip(&self, e: usize, x: &[Vec3]) -> Vec3 {
+    /// Friction and the tangential offset from the anchor.
+    fn rub(&self, e: usize, x: &[Vec3]) -> Option<(&Friction, Vec3)> {
         let pair = &self.pairs[e];
-        let s = self.plain_offset(e, x) - pair.anchor;
-        s - pair.normal * pair.normal.dot(&s)
+        let friction = pair.friction.as_ref()?;
+        Some((
+            friction,
+            friction.slip(&(self.plain_offset(e, x) - pair.anchor)),
+        ))
     }
 
     /// Outside normals at the vertices, weighted by area; zero where there is none.
@@ -196,14 +194,16 @@ impl SelfContact {
         } else {
             Vec3::zeros()
         };
+        let stiffness = self.stiffness * 0.5 * (self.areas[a as usize] + self.areas[b as usize]);
+        let normal = (w + bias).try_normalize(1e-300).unwrap_or(outside);
         Pair {
             distance,
-            stiffness: self.stiffness * 0.5 * (self.areas[a as usize] + self.areas[b as usize]),
+            stiffness,
             bias,
-            normal: (w + bias).try_normalize(1e-300).unwrap_or(outside),
+            normal,
             anchor: anchor.map_or(w, |p| p.offset),
-            bound: anchor.map_or(0.0, |p| self.friction * p.normal_force),
-            rubs: anchor.is_some(),
+            friction: anchor
+                .and_then(|p| Friction::new(normal, self.friction * p.normal_force, stiffness)),
         }
     }
 }
@@ -225,13 +225,8 @@ impl Term for SelfContact {
         let (d, _) = self.offset(e, at.x);
         let depth = (pair.distance - d).max(0.0);
         let mut energy = 0.5 * pair.stiffness * depth * depth;
-        if pair.rubs && pair.bound > 0.0 {
-            let s = self.slip(e, at.x).norm();
-            energy += if pair.stiffness * s <= pair.bound {
-                0.5 * pair.stiffness * s * s
-            } else {
-                pair.bound * (s - 0.5 * pair.bound / pair.stiffness)
-            };
+        if let Some((friction, s)) = self.rub(e, at.x) {
+            energy += friction.energy(&s);
         }
         energy
     }
@@ -240,10 +235,8 @@ impl Term for SelfContact {
         let pair = &self.pairs[e];
         let (d, n) = self.offset(e, at.x);
         let mut g = n * (-pair.stiffness * (pair.distance - d).max(0.0));
-        if pair.rubs && pair.bound > 0.0 {
-            let s = self.slip(e, at.x);
-            let force = pair.stiffness * s.norm();
-            g += s * (pair.stiffness * (pair.bound / force.max(pair.bound)));
+        if let Some((friction, s)) = self.rub(e, at.x) {
+            g += friction.force(&s);
         }
         out[0] = -g;
         out[1] = g;
@@ -258,20 +251,13 @@ impl Term for SelfContact {
             let along = n * n.transpose();
             h += along * k;
             // At d = 0 the force has no derivative; the part that would be infinite is left out.
-            if kind == HessianKind::Exact && d > 1e-12 * pair.distance {
-                h -= (Mat3::identity() - along) * (k * (pair.distance - d) / d);
+            if d > 1e-12 * pair.distance {
+                let bend = kind.exactness() * k * (pair.distance - d) / d;
+                h -= (Mat3::identity() - along) * bend;
             }
         }
-        if pair.rubs && pair.bound > 0.0 {
-            let s = self.slip(e, at.x);
-            let length = s.norm();
-            let tangent = Mat3::identity() - pair.normal * pair.normal.transpose();
-            if k * length <= pair.bound {
-                h += tangent * k;
-            } else {
-                let s = s / length;
-                h += (tangent - s * s.transpose()) * (pair.bound / length);
-            }
+        if let Some((friction, s)) = self.rub(e, at.x) {
+            h += friction.hessian(&s);
         }
         out[0] = h;
         out[1] = -h;
@@ -321,22 +307,16 @@ impl Term for SelfContact {
                 continue;
             }
             let w = self.plain_offset(e, at.x);
+            let normal_force = pair.stiffness * (pair.distance - d);
             let mut offset = w;
-            if pair.rubs {
-                let s = self.slip(e, at.x);
-                let force = pair.stiffness * s.norm();
-                let kept = if force > pair.bound {
-                    pair.bound / force
-                } else {
-                    1.0
-                };
-                offset -= s * kept;
+            if let Some((_, s)) = self.rub(e, at.x) {
+                offset -= kept(&s, self.friction * normal_force, pair.stiffness);
             }
             state.pair_anchors.push(PairAnchor {
                 a: self.stencils[2 * e],
                 b: self.stencils[2 * e + 1],
                 offset,
-                normal_force: pair.stiffness * (pair.distance - d),
+                normal_force,
             });
         }
     }

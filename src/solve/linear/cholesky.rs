@@ -1,0 +1,415 @@
+//! Sparse Cholesky `P A P^T = L L^T` (faer's supernodal factorization, one thread) in either
+//! precision.
+//!
+//! The fill-reducing permutation is approximate minimum degree (Amestoy, Davis and Duff 1996) on
+//! the graph of 3x3 blocks, expanded to scalars: the same fill as on scalars, several times
+//! cheaper, and the three scalars of a vertex stay together in a supernode. Values are permuted
+//! while they are copied from blocks into the lower triangle by scalar columns, so that faer
+//! factors them in place under the identity ordering.
+//!
+//! Permutation, symbolic factor and work memory are a function of the pattern alone and are kept
+//! while it stays the same; then a new factor allocates nothing.
+//!
+//! A matrix is refused as not positive definite when a pivot is not above 64 times the unit
+//! roundoff times the diagonal entry it came from (its solution would have no correct digit), and
+//! when an entry is not finite.
+
+use super::LinearError;
+use crate::math::Vec3;
+use crate::math::block::{BlockMatrix, BlockPattern};
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt::factor::LltRegularization;
+use faer::sparse::linalg::SupernodalThreshold;
+use faer::sparse::linalg::amd;
+use faer::sparse::linalg::cholesky::{
+    CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
+    factorize_symbolic_cholesky, supernodal,
+};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRef};
+use faer::traits::RealField;
+use faer::{Par, Side};
+use std::ops::{Add, Div, Mul, Sub};
+
+/// A precision to factor in.
+pub(super) trait Number:
+    RealField
+    + Copy
+    + Send
+    + Into<f64>
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+{
+    /// Distance from 1 to the next number.
+    const EPSILON: f64;
+    /// The nearest number.
+    fn of(value: f64) -> Self;
+}
+
+impl Number for f64 {
+    const EPSILON: f64 = f64::EPSILON;
+    fn of(value: f64) -> Self {
+        value
+    }
+}
+
+impl Number for f32 {
+    const EPSILON: f64 = f32::EPSILON as f64;
+    fn of(value: f64) -> Self {
+        value as f32
+    }
+}
+
+/// What depends on the pattern, and memory of the sizes it asks for.
+pub(super) struct Cholesky<T> {
+    pattern: BlockPattern,
+    /// New place of each block row.
+    place: Vec<usize>,
+    /// `2 * slot + transposed` of the blocks of the permuted lower triangle, column by column.
+    source: Vec<usize>,
+    /// Start of each permuted block column in `source`.
+    starts: Vec<usize>,
+    lower: SymbolicSparseColMat<usize>,
+    symbolic: SymbolicCholesky<usize>,
+    values: Vec<T>,
+    factor: Vec<T>,
+    rhs: Vec<T>,
+    /// Part of a vector below a supernode.
+    below: Vec<T>,
+    factor_memory: MemBuffer,
+    work_bytes: usize,
+}
+
+impl<T: Number> Cholesky<T> {
+    /// The analysis kept in `slot`, made anew where the pattern has changed.
+    pub(super) fn for_pattern<'a>(
+        slot: &'a mut Option<Self>,
+        pattern: &BlockPattern,
+    ) -> Result<&'a mut Self, LinearError> {
+        // the old memory goes before the new is taken
+        if slot.as_ref().is_some_and(|c| c.pattern != *pattern) {
+            *slot = None;
+        }
+        if slot.is_none() {
+            *slot = Some(Self::new(pattern)?);
+        }
+        slot.as_mut().ok_or(LinearError::NoConvergence)
+    }
+
+    /// Analysis of a pattern.
+    fn new(pattern: &BlockPattern) -> Result<Self, LinearError> {
+        let n = pattern.n();
+        let place = minimum_degree(pattern)?;
+
+        // Permuted block columns of the lower triangle: (column, row, source), sorted.
+        let mut entries = Vec::with_capacity(pattern.rows.len());
+        for j in 0..n {
+            for k in pattern.starts[j] as usize..pattern.starts[j + 1] as usize {
+                let (p, q) = (place[pattern.rows[k] as usize], place[j]);
+                let transposed = p < q;
+                entries.push((p.min(q), p.max(q), 2 * k + usize::from(transposed)));
+            }
+        }
+        entries.sort_unstable();
+        let mut starts = vec![0; n + 1];
+        for &(column, _, _) in &entries {
+            starts[column + 1] += 1;
+        }
+        for j in 0..n {
+            starts[j + 1] += starts[j];
+        }
+
+        let lower = scalar_lower(n, &starts, &entries);
+        let symbolic = {
+            let (column_starts, rows) = scalar_upper(n, &entries);
+            let upper =
+                SymbolicSparseColMatRef::new_checked(3 * n, 3 * n, &column_starts, None, &rows);
+            let params = CholeskySymbolicParams {
+                supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
+                ..Default::default()
+            };
+            factorize_symbolic_cholesky(upper, Side::Upper, SymmetricOrdering::Identity, params)
+                .map_err(|_| LinearError::NoConvergence)?
+        };
+        let factor_need = symbolic.factorize_numeric_llt_scratch::<T>(Par::Seq, Default::default());
+        Ok(Self {
+            pattern: pattern.clone(),
+            place,
+            source: entries.iter().map(|e| e.2).collect(),
+            starts,
+            values: vec![T::of(0.0); lower.row_idx().len()],
+            factor: vec![T::of(0.0); symbolic.len_val()],
+            rhs: vec![T::of(0.0); 3 * n],
+            below: vec![T::of(0.0); 3 * n],
+            factor_memory: MemBuffer::try_new(factor_need)
+                .map_err(|_| LinearError::NoConvergence)?,
+            work_bytes: factor_need.unaligned_bytes_required(),
+            lower,
+            symbolic,
+        })
+    }
+
+    /// Factors a matrix of the pattern.
+    pub(super) fn prepare(&mut self, matrix: &BlockMatrix) -> Result<(), LinearError> {
+        self.load(matrix)?;
+        self.factorize()
+    }
+
+    /// Copies the blocks into permuted scalar columns; refuses what is not finite.
+    fn load(&mut self, matrix: &BlockMatrix) -> Result<(), LinearError> {
+        let mut poison = 0.0;
+        let mut at = 0;
+        for j in 0..self.place.len() {
+            let blocks = &self.source[self.starts[j]..self.starts[j + 1]];
+            for c in 0..3 {
+                for (k, &source) in blocks.iter().enumerate() {
+                    let block = &matrix.blocks[source >> 1];
+                    // The diagonal block comes first in its column and gives its lower part.
+                    for r in if k == 0 { c } else { 0 }..3 {
+                        let value = if source & 1 == 1 {
+                            block[(c, r)]
+                        } else {
+                            block[(r, c)]
+                        };
+                        poison += value * 0.0;
+                        self.values[at] = T::of(value);
+                        at += 1;
+                    }
+                }
+            }
+        }
+        if poison.is_nan() {
+            return Err(LinearError::NotPositiveDefinite);
+        }
+        Ok(())
+    }
+
+    fn factorize(&mut self) -> Result<(), LinearError> {
+        if self.place.is_empty() {
+            return Ok(());
+        }
+        self.symbolic
+            .factorize_numeric_llt(
+                &mut self.factor,
+                SparseColMatRef::new(self.lower.as_ref(), &self.values),
+                Side::Lower,
+                LltRegularization::default(),
+                Par::Seq,
+                MemStack::new(&mut self.factor_memory),
+                Default::default(),
+            )
+            .map_err(|_| LinearError::NotPositiveDefinite)?;
+        self.check_pivots()
+    }
+
+    /// Compares every pivot with the diagonal entry that it was reduced from.
+    fn check_pivots(&self) -> Result<(), LinearError> {
+        let SymbolicCholeskyRaw::Supernodal(symbolic) = self.symbolic.raw() else {
+            return Err(LinearError::NoConvergence);
+        };
+        let factor = supernodal::SupernodalLltRef::new(symbolic, &self.factor);
+        let columns = self.lower.col_ptr();
+        for s in 0..symbolic.n_supernodes() {
+            let node = factor.supernode(s);
+            let block = node.val();
+            for c in 0..block.ncols() {
+                let root: f64 = block[(c, c)].into();
+                let diagonal: f64 = self.values[columns[node.start() + c]].into();
+                let pivot = root * root;
+                if pivot.is_nan() || pivot <= 64.0 * T::EPSILON * diagonal {
+                    return Err(LinearError::NotPositiveDefinite);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Solves with the factor.
+    pub(super) fn solve(&mut self, b: &[Vec3], x: &mut [Vec3]) -> Result<(), LinearError> {
+        if b.is_empty() {
+            return Ok(());
+        }
+        for (b, &p) in b.iter().zip(&self.place) {
+            for c in 0..3 {
+                self.rhs[3 * p + c] = T::of(b[c]);
+            }
+        }
+        self.substitute()?;
+        for (x, &p) in x.iter_mut().zip(&self.place) {
+            *x = Vec3::from_fn(|c, _| self.rhs[3 * p + c].into());
+            if !x.iter().all(|v| v.is_finite()) {
+                return Err(LinearError::NoConvergence);
+            }
+        }
+        Ok(())
+    }
+
+    /// `rhs = L^-T L^-1 rhs`, supernode by supernode: plain loops over the columns of the panels beat
+    /// the general dense kernels for one right-hand side and narrow panels.
+    fn substitute(&mut self) -> Result<(), LinearError> {
+        let SymbolicCholeskyRaw::Supernodal(symbolic) = self.symbolic.raw() else {
+            return Err(LinearError::NoConvergence);
+        };
+        let (begins, ends) = (symbolic.supernode_begin(), symbolic.supernode_end());
+        let (row_starts, value_starts) =
+            (symbolic.col_ptr_for_row_idx(), symbolic.col_ptr_for_val());
+        let (rows, x) = (symbolic.row_idx(), &mut self.rhs);
+        for s in 0..symbolic.n_supernodes() {
+            let (begin, width) = (begins[s], ends[s] - begins[s]);
+            let rows = &rows[row_starts[s]..row_starts[s + 1]];
+            let panel = &self.factor[value_starts[s]..value_starts[s + 1]];
+            let below = &mut self.below[..rows.len()];
+            below.fill(T::of(0.0));
+            for (j, column) in panel.chunks_exact(width + rows.len()).enumerate() {
+                let value = x[begin + j] / column[j];
+                x[begin + j] = value;
+                for (x, l) in x[begin + j + 1..].iter_mut().zip(&column[j + 1..width]) {
+                    *x = *x - *l * value;
+                }
+                for (b, l) in below.iter_mut().zip(&column[width..]) {
+                    *b = *b + *l * value;
+                }
+            }
+            for (b, row) in below.iter().zip(rows) {
+                x[*row] = x[*row] - *b;
+            }
+        }
+        for s in (0..symbolic.n_supernodes()).rev() {
+            let (begin, width) = (begins[s], ends[s] - begins[s]);
+            let rows = &rows[row_starts[s]..row_starts[s + 1]];
+            let panel = &self.factor[value_starts[s]..value_starts[s + 1]];
+            let below = &mut self.below[..rows.len()];
+            for (b, row) in below.iter_mut().zip(rows) {
+                *b = x[*row];
+            }
+            for (j, column) in panel.chunks_exact(width + rows.len()).enumerate().rev() {
+                let inside = dot(&column[j + 1..width], &x[begin + j + 1..begin + width]);
+                x[begin + j] = (x[begin + j] - inside - dot(&column[width..], below)) / column[j];
+            }
+        }
+        Ok(())
+    }
+
+    /// Stored numbers of the factor, padding of supernodes included.
+    pub(super) fn factor_length(&self) -> usize {
+        self.factor.len()
+    }
+
+    /// Block rows.
+    pub(super) fn n(&self) -> usize {
+        self.place.len()
+    }
+
+    /// Bytes held.
+    pub(super) fn bytes(&self) -> usize {
+        let numbers = self.values.len() + self.factor.len() + 2 * self.rhs.len();
+        let indices = self.place.len()
+            + self.source.len()
+            + self.starts.len()
+            + self.lower.row_idx().len()
+            + self.lower.col_ptr().len();
+        let symbolic = match self.symbolic.raw() {
+            SymbolicCholeskyRaw::Supernodal(s) => s.row_idx().len() + 4 * s.n_supernodes(),
+            SymbolicCholeskyRaw::Simplicial(s) => s.row_idx().len() + s.nrows(),
+        };
+        size_of::<T>() * numbers
+            + 8 * (indices + symbolic)
+            + 4 * (self.pattern.rows.len() + self.pattern.starts.len())
+            + self.work_bytes
+    }
+}
+
+/// Inner product in a fixed order, in eight strands so that it can be vectorised.
+fn dot<T: Number>(a: &[T], b: &[T]) -> T {
+    const STRANDS: usize = 8;
+    let mut sums = [T::of(0.0); STRANDS];
+    let (whole_a, rest_a) = a.as_chunks::<STRANDS>();
+    let (whole_b, rest_b) = b.as_chunks::<STRANDS>();
+    for (a, b) in whole_a.iter().zip(whole_b) {
+        for k in 0..STRANDS {
+            sums[k] = sums[k] + a[k] * b[k];
+        }
+    }
+    let mut sum = T::of(0.0);
+    for k in 0..STRANDS / 2 {
+        sum = sum + (sums[k] + sums[k + STRANDS / 2]);
+    }
+    for (a, b) in rest_a.iter().zip(rest_b) {
+        sum = sum + *a * *b;
+    }
+    sum
+}
+
+/// New place of each block row under approximate minimum degree.
+fn minimum_degree(pattern: &BlockPattern) -> Result<Vec<usize>, LinearError> {
+    let n = pattern.n();
+    let starts: Vec<usize> = pattern.starts.iter().map(|&s| s as usize).collect();
+    let rows: Vec<usize> = pattern.rows.iter().map(|&r| r as usize).collect();
+    let graph = SymbolicSparseColMatRef::new_checked(n, n, &starts, None, &rows);
+    let mut old = vec![0_usize; n];
+    let mut place = vec![0_usize; n];
+    let mut memory = MemBuffer::try_new(amd::order_scratch::<usize>(n, rows.len()))
+        .map_err(|_| LinearError::NoConvergence)?;
+    amd::order(
+        &mut old,
+        &mut place,
+        graph,
+        amd::Control::default(),
+        MemStack::new(&mut memory),
+    )
+    .map_err(|_| LinearError::NoConvergence)?;
+    Ok(place)
+}
+
+/// Scalar columns of the lower triangle from sorted block entries `(column, row, _)`.
+fn scalar_lower(
+    n: usize,
+    starts: &[usize],
+    entries: &[(usize, usize, usize)],
+) -> SymbolicSparseColMat<usize> {
+    let mut column_starts = Vec::with_capacity(3 * n + 1);
+    let mut rows = Vec::with_capacity(9 * entries.len());
+    column_starts.push(0);
+    for j in 0..n {
+        for c in 0..3 {
+            for &(column, row, _) in &entries[starts[j]..starts[j + 1]] {
+                let first = if row == column { c } else { 0 };
+                rows.extend((first..3).map(|r| 3 * row + r));
+            }
+            column_starts.push(rows.len());
+        }
+    }
+    SymbolicSparseColMat::new_checked(3 * n, 3 * n, column_starts, None, rows)
+}
+
+/// Scalar columns of the upper triangle (what the symbolic analysis reads) from the same entries.
+fn scalar_upper(n: usize, entries: &[(usize, usize, usize)]) -> (Vec<usize>, Vec<usize>) {
+    // Sorted by (column, row) of the lower triangle, so each upper column fills in row order.
+    let mut counts = vec![0; n + 1];
+    for &(_, row, _) in entries {
+        counts[row + 1] += 1;
+    }
+    for j in 0..n {
+        counts[j + 1] += counts[j];
+    }
+    let mut block_rows = vec![0; entries.len()];
+    let mut next = counts.clone();
+    for &(column, row, _) in entries {
+        block_rows[next[row]] = column;
+        next[row] += 1;
+    }
+    let mut column_starts = Vec::with_capacity(3 * n + 1);
+    let mut rows = Vec::with_capacity(9 * entries.len());
+    column_starts.push(0);
+    for j in 0..n {
+        for c in 0..3 {
+            for &i in &block_rows[counts[j]..counts[j + 1]] {
+                let last = if i == j { c } else { 2 };
+                rows.extend((0..=last).map(|r| 3 * i + r));
+            }
+            column_starts.push(rows.len());
+        }
+    }
+    (column_starts, rows)
+}
