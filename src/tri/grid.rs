@@ -150,7 +150,7 @@ mod tests {
                 })
                 .sum();
             assert!((area - 2.0).abs() < 1e-12, "{pattern:?} {area}");
-            let edges = quality::edges(&mesh);
+            let edges = crate::math::topology::edges(&mesh.triangles);
             let hinges = quality::hinges(&mesh);
             assert_eq!(mesh.uv.len() + mesh.triangles.len() - edges.len(), 1);
             assert_eq!(edges.len() - hinges.len(), 2 * (6 + 4));

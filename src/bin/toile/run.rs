@@ -9,10 +9,10 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 use toile::error::Error;
-use toile::math::Vec3;
+use toile::math::{Vec3, topology};
 use toile::readout::export::{gltf, obj, pc2};
 use toile::readout::picture::{PictureOptions, render};
-use toile::readout::{Part, crossings, surface};
+use toile::readout::{Part, crossings};
 use toile::scene::Scene;
 use toile::sim::{DrapeOptions, Outcome, Progress, Sim, StepReport};
 use toile::sim_scene::{Driver, build};
@@ -152,7 +152,7 @@ fn write(
     let text = obj::to_obj(x, triangles, sim.vertex_uv(), sim.vertex_panels(), &names);
     file(&dir.join("garment.obj"), text.as_bytes())?;
     let mut parts = vec![Part::garment("garment", x, triangles, sim.vertex_panels())];
-    let edges = surface::edges(triangles);
+    let edges = topology::edges(triangles);
     for (i, body) in (0_u32..).zip(&scene.bodies) {
         let (positions, faces) = sim.body_mesh(i)?;
         summary.body_crossings += crossings::crossing_edges(x, &edges, &positions, &faces).len();
