@@ -112,6 +112,7 @@ pub(crate) fn table(scene: &Scene, json: &Value, dir: &Path) -> String {
         ("steps", "steps"),
         ("Newton iterations", "newton_iterations"),
         ("edges through a body", "body_crossings"),
+        ("threads", "threads"),
     ] {
         row(name, plain(key).unwrap_or_default());
     }
