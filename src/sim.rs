@@ -69,6 +69,8 @@ pub struct SystemInfo {
     pub factor_bytes: usize,
     /// Smallest triangle angle [rad].
     pub min_angle: f64,
+    /// What the triangulation could not do as asked, each with the panel's name.
+    pub notes: Vec<String>,
     /// Name of the linear solver.
     pub backend: String,
 }
@@ -173,7 +175,9 @@ impl Sim {
         Ok((positions, triangles))
     }
 
-    /// Where the body is to be at the end of the next step (before the first step: where it is).
+    /// Where the body is to be at the end of the next step; the cloth feels the velocity that
+    /// follows. Before the first step or drape it is a placement: the body stands there at once and
+    /// has no velocity. A drape takes the body to its pose before it begins.
     pub fn set_body_pose(&mut self, body: u32, position: [f64; 3], xyzw: [f64; 4]) -> Result<()> {
         let b = check_index(body, self.bodies.len())?;
         finite("position", &position)?;
@@ -196,7 +200,8 @@ impl Sim {
         Ok(())
     }
 
-    /// Vertices of a deforming mesh body at the end of the next step, body frame [m].
+    /// Vertices of a deforming mesh body at the end of the next step, body frame [m]; like a pose, a
+    /// placement before the first step or drape.
     pub fn set_body_vertices(&mut self, body: u32, positions: &[[f64; 3]]) -> Result<()> {
         let b = check_index(body, self.bodies.len())?;
         let count = self.bodies[b].0.vertices().len();
@@ -224,6 +229,13 @@ impl Sim {
         }
         self.epoch += 1;
         Ok(())
+    }
+
+    /// From here on a pose is a motion, even before the first step.
+    pub fn end_placement(&mut self) {
+        for body in &mut self.state.bodies {
+            body.moved_with_time = true;
+        }
     }
 
     /// Force and torque of the cloth on a body, about the body's origin, world axes [N], [N m].
@@ -406,6 +418,7 @@ impl Sim {
         drop(engine);
         match done {
             Ok(report) => {
+                self.end_placement();
                 self.epoch += 1;
                 Ok(report)
             }
@@ -607,6 +620,24 @@ impl Sim {
         value.ok_or_else(|| Error::argument(format!("'{name}' is not the name of a number")))
     }
 
+    /// A sentence for each panel that was refined with a lower angle limit than asked for.
+    fn lowered_angles(&self) -> Vec<String> {
+        self.mesh
+            .lowered
+            .iter()
+            .map(|l| {
+                let name = self.garment.panels.get(l.panel as usize);
+                format!(
+                    "panel {} '{}': refinement ended only with an angle limit of {:.0} degrees, {:.0} were asked",
+                    l.panel,
+                    name.map_or("", |p| p.name.as_str()),
+                    l.kept.to_degrees(),
+                    l.asked.to_degrees()
+                )
+            })
+            .collect()
+    }
+
     /// What was built and what it costs.
     pub fn info(&self) -> SystemInfo {
         let engine = self.engine();
@@ -623,6 +654,7 @@ impl Sim {
             bytes: engine.matrix_bytes() + system.bytes(),
             factor_bytes: engine.factor_bytes(),
             min_angle: self.mesh.min_angle,
+            notes: self.lowered_angles(),
             backend: engine.backend().to_owned(),
         }
     }

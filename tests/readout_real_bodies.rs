@@ -76,7 +76,7 @@ fn shirt_on_body_is_drawn_with_both_colours_in_it() {
         let blue = shares(&|p| i32::from(p[2]) - i32::from(p[0]) > 40);
         let orange = shares(&|p| i32::from(p[0]) - i32::from(p[2]) > 60);
         assert!(blue > 0.02 && orange > 0.02, "{blue} {orange}");
-        let glb = export::gltf::to_glb(&parts, None).unwrap();
+        let glb = export::gltf::to_glb(&parts, &[]).unwrap();
         assert!(glb.len() > 12 * (x.len() + sx.len()) && glb.len().is_multiple_of(4));
         let crossing = crossings::crossing_edges(&sx, &toile::math::topology::edges(&st), &x, &t);
         println!(

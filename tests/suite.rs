@@ -25,6 +25,8 @@ mod capi_threads;
 mod cli_toile;
 #[path = "docs.rs"]
 mod docs;
+#[path = "fuzz_targets.rs"]
+mod fuzz_targets;
 #[path = "hard_cases.rs"]
 mod hard_cases;
 #[path = "header.rs"]
@@ -55,6 +57,8 @@ mod real_garments;
 mod reference_bending;
 #[path = "reference_membrane.rs"]
 mod reference_membrane;
+#[path = "scene_motion.rs"]
+mod scene_motion;
 #[path = "scene_reader.rs"]
 mod scene_reader;
 #[path = "self_contact_sheets.rs"]

@@ -224,3 +224,32 @@ fn sizes_are_refused_before_memory_is_taken() {
     let mesh = triangulate(&garment, 1e6, 10_000).unwrap();
     check_mesh(&garment, &mesh);
 }
+
+#[test]
+fn a_panel_that_cannot_be_refined_as_asked_is_named() {
+    // room for fewer vertices than good angles need: refinement gives in angle by angle
+    let needle = [[0.0, 0.0], [0.5, 0.0], [0.5, 0.009]];
+    let mut sewn = garment(vec![polygon(&needle)], vec![], 0.005);
+    sewn.panels[0].name = "needle".into();
+    let free = triangulate(&sewn, 1.0, 200_000).unwrap();
+    assert_eq!(free.lowered, []);
+    let limit = free.uv.len() - 1;
+    let tight = triangulate(&sewn, 1.0, limit).unwrap();
+    assert_eq!(tight.lowered.len(), 1);
+    let lowered = tight.lowered[0];
+    assert_eq!(lowered.panel, 0);
+    assert!((lowered.asked.to_degrees() - 30.0).abs() < 1e-9);
+    assert!(lowered.kept < lowered.asked);
+
+    let mut settings = toile::sim::Settings::default();
+    settings.max_vertices = limit as f64;
+    let options = toile::sim::SimOptions {
+        settings,
+        ..Default::default()
+    };
+    let notes = toile::sim::Sim::new(&sewn, &options).unwrap().info().notes;
+    assert_eq!(notes.len(), 1);
+    for words in ["panel 0 'needle'", "30 were asked"] {
+        assert!(notes[0].contains(words), "{words}: {notes:?}");
+    }
+}

@@ -269,7 +269,7 @@ pub const MOTION: &[Key] = &[
         "boolean",
         "",
         "false",
-        "start over after the last frame",
+        "with frames: start over after the last one",
     ),
 ];
 

@@ -124,6 +124,7 @@ pub fn structured_sheet(
         triangles,
         seams: Vec::new(),
         min_angle: 0.0,
+        lowered: Vec::new(),
     };
     mesh.min_angle = quality::min_angle(&mesh);
     Ok(mesh)

@@ -117,7 +117,7 @@ pub(crate) fn info(args: &SceneArgs) -> Done {
             scene.run.dt
         ),
     );
-    for note in &scene.notes {
+    for note in info.notes.iter().chain(&scene.notes) {
         row("note", note.clone());
     }
     out(&text)
@@ -132,7 +132,10 @@ pub(crate) fn check(args: &SceneArgs) -> Done {
         // what only building shows: triangles, seams, pins
         if problems.is_empty() {
             let built = apply(&mut scene, args).and_then(|()| sim_scene::build(&scene));
-            problems.extend(built.err());
+            match built {
+                Ok(sim) => notes.append(&mut sim.info().notes),
+                Err(e) => problems.push(e),
+            }
         }
     }
     let mut report = String::new();
