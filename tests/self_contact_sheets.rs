@@ -2,9 +2,7 @@
 
 #![allow(clippy::expect_used, reason = "test code")]
 
-mod self_contact_cases;
-
-use self_contact_cases::{Random, at, squares, state};
+use crate::self_contact_cases::{Random, at, squares, state};
 use std::time::Instant;
 use toile::cloth::Cloth;
 use toile::math::block::{BlockMatrix, BlockPattern};

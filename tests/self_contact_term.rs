@@ -2,9 +2,7 @@
 
 #![allow(clippy::expect_used, reason = "test code")]
 
-mod self_contact_cases;
-
-use self_contact_cases::{Random, at, sew, squares, state};
+use crate::self_contact_cases::{Random, at, sew, squares, state};
 use toile::math::{Mat3, Vec3};
 use toile::system::contact::self_contact::SelfContact;
 use toile::system::contact::spheres::{Grid, Spheres, covering_radius};

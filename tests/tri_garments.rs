@@ -1,8 +1,6 @@
 //! Triangulation of the project's own and of awkward garments.
 
-#[path = "tri_common/mod.rs"]
-mod tri_common;
-
+use crate::tri_common::{check_mesh, check_transfer};
 use std::path::Path;
 use toile::error::Status;
 use toile::math::Vec2;
@@ -11,7 +9,6 @@ use toile::pattern::import::garment_from_file;
 use toile::pattern::{Edge, EdgeRef, Fabric, Garment, Panel, Seam};
 use toile::tri::grid::{rectangle, sheet_garment};
 use toile::tri::triangulate;
-use tri_common::{check_mesh, check_transfer};
 
 fn example(name: &str) -> Garment {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -241,8 +238,10 @@ fn a_panel_that_cannot_be_refined_as_asked_is_named() {
     assert!((lowered.asked.to_degrees() - 30.0).abs() < 1e-9);
     assert!(lowered.kept < lowered.asked);
 
-    let mut settings = toile::sim::Settings::default();
-    settings.max_vertices = limit as f64;
+    let settings = toile::sim::Settings {
+        max_vertices: limit as f64,
+        ..Default::default()
+    };
     let options = toile::sim::SimOptions {
         settings,
         ..Default::default()
