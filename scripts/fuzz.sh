@@ -17,7 +17,8 @@ RUSTFLAGS="$flags" "${CARGO:-cargo}" build --release --locked --manifest-path fu
 
 mkdir -p target/fuzz/corpus/{calls,text,scene}
 cp examples/tshirt.json examples/skirt.json examples/two_panels.json target/fuzz/corpus/text/
-cp examples/*_scene.json target/fuzz/corpus/scene/
+# the other scenes have a mannequin, which takes a second to make
+cp fuzz/seeds/scene.json examples/sphere_scene.json target/fuzz/corpus/scene/
 for name in calls text scene; do
   echo "fuzz: $name for $seconds s"
   log=target/fuzz/$name.log
