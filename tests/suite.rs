@@ -72,6 +72,8 @@ mod reference_bending;
 mod reference_membrane;
 #[path = "scene_motion.rs"]
 mod scene_motion;
+#[path = "scene_motion_errors.rs"]
+mod scene_motion_errors;
 #[path = "scene_reader.rs"]
 mod scene_reader;
 #[path = "self_contact_sheets.rs"]
