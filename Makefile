@@ -3,7 +3,8 @@
 #   make test    the whole check, the same as on the build machine
 #   make quick   unit tests only, under a minute once built
 #   make bench   tables of speed and error
-#   make soak    the long random runs
+#   make fuzz    every fuzz target, FUZZ_SECONDS (20) each
+#   make soak    the long random runs, fuzz targets included
 #   make header  write include/toile.h and tests/golden/abi.txt anew
 #   make install PREFIX=/usr/local
 
@@ -15,7 +16,7 @@ LIB    := target/release/libtoile.so
 PYTHON := target/venv/bin/python
 export TOILE_PYTHON ?= $(abspath $(PYTHON))
 
-.PHONY: all demo test quick bench soak header install tools lint clean
+.PHONY: all demo test quick bench fuzz soak header install tools lint clean
 
 all:
 	$(CARGO) build --release
@@ -44,11 +45,15 @@ quick:
 bench: all
 	$(CARGO) bench
 
+fuzz:
+	@bash scripts/fuzz.sh $(FUZZ_SECONDS)
+
 soak: all
+	@bash scripts/fuzz.sh $(or $(FUZZ_SECONDS),300)
 	TOILE_SOAK=1 $(CARGO) test --release -- --include-ignored
 
 header:
-	TOILE_BLESS=1 $(CARGO) test --release --test header --test abi
+	TOILE_BLESS=1 $(CARGO) test --release --test suite -- header:: abi::
 
 install: all
 	bash scripts/install.sh "$(PREFIX)"

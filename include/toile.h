@@ -816,6 +816,11 @@ toile_status toile_garment_set_blend_region(struct toile_garment *garment,
 toile_status toile_garment_clear_blend_region(struct toile_garment *garment);
 
 /**
+ * Frees a garment; NULL is allowed. Simulations made of it are not concerned.
+ */
+void toile_garment_free(struct toile_garment *garment);
+
+/**
  * Refuses a garment that cannot be, naming panel, edge or seam, as toile_sim_create would.
  */
 toile_status toile_garment_check(const struct toile_garment *garment);
@@ -873,11 +878,6 @@ toile_status toile_garment_to_svg(const struct toile_garment *garment,
                                   char *out,
                                   size_t capacity,
                                   size_t *needed);
-
-/**
- * Frees a garment; NULL is allowed. Simulations made of it are not concerned.
- */
-void toile_garment_free(struct toile_garment *garment);
 
 /**
  * A sphere around its origin, radius [m]. Free it with toile_body_free; simulations that use a body
@@ -975,7 +975,9 @@ toile_status toile_sim_set_body_sdf(struct toile_sim *sim,
 
 /**
  * Says where a body is to be at the end of the next step: position [m] of its origin and rotation
- * x, y, z, w. Before the first step: where it is. The cloth feels the velocity that follows.
+ * x, y, z, w. The cloth feels the velocity that follows. Before the first step or drape it is a
+ * placement: the body stands there at once and has no velocity. A drape takes the body to its pose
+ * before it begins.
  */
 toile_status toile_sim_set_body_pose(struct toile_sim *sim,
                                      uint32_t body,
@@ -985,7 +987,7 @@ toile_status toile_sim_set_body_pose(struct toile_sim *sim,
 /**
  * Says where the vertices of a mesh body are to be at the end of the next step, in the body's
  * frame [m], shape [vertex_count, 3]. `vertex_count` must be the body's. The cloth feels the
- * velocities that follow.
+ * velocities that follow; before the first step or drape it is a placement, as with a pose.
  */
 toile_status toile_sim_set_body_vertices(struct toile_sim *sim,
                                          uint32_t body,

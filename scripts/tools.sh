@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Installs what the tests use beside Rust and a C/C++ compiler: clang, CMake, pkg-config and valgrind
-# as Debian packages where this user may install them, and a Python environment in target/venv.
+# as Debian packages where this user may install them, a Python environment in target/venv and the
+# wheels that the package's installation needs in target/wheels.
 # Prints what is missing and goes on; under CI=true a missing tool is an error.
 set -u
 cd "$(dirname "$0")/.."
@@ -18,6 +19,11 @@ if [ ! -x target/venv/bin/python ] || ! target/venv/bin/python -c 'import numpy,
   echo "tools: making a Python environment in target/venv"
   mkdir -p target
   python3 -m venv target/venv && target/venv/bin/pip install --quiet --disable-pip-version-check numpy pytest setuptools wheel
+fi
+# what `pip install ./python` asks for, so that its test needs no network
+if [ -x target/venv/bin/python ] && ! ls target/wheels/numpy-* target/wheels/setuptools-* target/wheels/wheel-* >/dev/null 2>&1; then
+  echo "tools: fetching wheels into target/wheels"
+  target/venv/bin/pip download --quiet --disable-pip-version-check --dest target/wheels numpy 'setuptools>=68' wheel
 fi
 status=0
 for tool in clang cmake pkg-config valgrind target/venv/bin/python; do

@@ -154,6 +154,8 @@ impl Driver {
 
     /// Says where everything is at `time` [s], the end of the next step.
     pub fn set(&mut self, sim: &mut Sim, scene: &Scene, time: f64) -> Result<()> {
+        // the bodies stand at their start: from here on they go, the first step included
+        sim.end_placement();
         for (i, body) in scene.bodies.iter().enumerate() {
             let index = u32::try_from(i).map_err(|_| Error::limit("too many bodies"))?;
             if body.motion.keys.len() > 1 {

@@ -170,6 +170,40 @@ fn numbers_of_the_command_line_reach_the_simulation() {
 }
 
 #[test]
+fn a_run_takes_every_core_unless_told_and_its_bits_do_not_depend_on_it() {
+    let folder = Folder::new("threads");
+    let cores = std::thread::available_parallelism().unwrap().get() as u64;
+    let mut fixed = scene();
+    fixed["numbers"] = json!({"solver.threads": 3});
+    let plain = folder.write("plain.json", &scene().to_string());
+    let fixed = folder.write("fixed.json", &fixed.to_string());
+    let mut states = Vec::new();
+    for (file, more, threads) in [
+        (&plain, &[][..], cores.min(256)),
+        (&plain, &["--threads", "1"], 1),
+        (&plain, &["--set", "solver.threads=2"], 2),
+        (&fixed, &[], 3),
+        (&fixed, &["--threads", "1"], 1),
+    ] {
+        let out = folder.0.join("out");
+        let args = ["run", path(file), "--out", path(&out)];
+        let output = toile(&[&args, more].concat());
+        assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+        let table = text(&output.stdout);
+        let row = table
+            .lines()
+            .find(|l| l.trim().starts_with("threads"))
+            .unwrap();
+        assert!(row.ends_with(&format!(" {threads}")), "{row}");
+        let summary: Value =
+            serde_json::from_slice(&std::fs::read(out.join("summary.json")).unwrap()).unwrap();
+        assert_eq!(summary["threads"], threads, "{more:?}");
+        states.push(std::fs::read(out.join("state.bin")).unwrap());
+    }
+    assert!(states.iter().all(|s| *s == states[0]));
+}
+
+#[test]
 fn refusals_have_their_exit_code_and_name_file_and_place() {
     let folder = Folder::new("refused");
     let mut broken = scene();

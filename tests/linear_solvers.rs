@@ -2,9 +2,7 @@
 
 #![allow(clippy::expect_used, reason = "test code")]
 
-mod linear_cases;
-
-use linear_cases::{Random, add, forces, residual, sewn_cloth};
+use crate::linear_cases::{Random, add, forces, residual, sewn_cloth};
 use toile::math::block::{BlockMatrix, BlockPattern};
 use toile::math::{Mat3, Vec3};
 use toile::solve::linear::choose::solver;

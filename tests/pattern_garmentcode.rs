@@ -1,9 +1,6 @@
 //! The readers against the tables that GarmentCode's own tools printed.
 
-#[path = "common_data/mod.rs"]
-mod common_data;
-
-use common_data::data_dir;
+use crate::common_data::data_dir;
 use std::collections::BTreeMap;
 use std::path::Path;
 use toile::pattern::curve::Curve;

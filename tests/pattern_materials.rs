@@ -1,14 +1,11 @@
 //! Measured fabrics become positive definite ones, and what is dropped is told.
 
-#[path = "common_data/mod.rs"]
-mod common_data;
-
 use toile::pattern::export::{fabric_to_json, garment_to_json};
 use toile::pattern::import::{fabric_from_json, garment_from_file, garment_from_json};
 
 #[test]
 fn measured_fabrics_are_read_from_sample_zero() {
-    let Some(data) = common_data::data_dir() else {
+    let Some(data) = crate::common_data::data_dir() else {
         return;
     };
     for (file, expected) in [
@@ -71,7 +68,7 @@ fn measured_fabrics_are_read_from_sample_zero() {
 
 #[test]
 fn real_garments_come_back_from_toiles_own_json_bit_for_bit() {
-    let Some(data) = common_data::data_dir() else {
+    let Some(data) = crate::common_data::data_dir() else {
         return;
     };
     for file in [

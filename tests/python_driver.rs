@@ -1,4 +1,4 @@
-//! Runs the tests of the Python package against the library that was just built.
+//! Runs the tests of the Python package against the library that was just built, and installs it.
 //!
 //! `TOILE_PYTHON` names an interpreter with NumPy and pytest; without it the test is skipped with a
 //! reason, but not in CI.
@@ -20,28 +20,20 @@ fn library() -> PathBuf {
     release.join(name)
 }
 
-#[test]
-fn python_package_passes_its_tests() {
-    let Some(python) = std::env::var_os("TOILE_PYTHON") else {
-        assert_ne!(
-            std::env::var("CI").as_deref(),
-            Ok("true"),
-            "TOILE_PYTHON is unset"
-        );
-        eprintln!("skipped: TOILE_PYTHON is unset");
-        return;
-    };
-    let library = library();
-    assert!(library.is_file(), "{} is not built", library.display());
-    let package = Path::new(env!("CARGO_MANIFEST_DIR")).join("python");
-    let output = Command::new(&python)
-        .args(["-m", "pytest", "-q", "-p", "no:cacheprovider"])
-        .current_dir(&package)
-        .env("PYTHONPATH", &package)
-        .env("PYTHONDONTWRITEBYTECODE", "1")
-        .env("TOILE_LIBRARY", &library)
+/// The interpreter, or a reason why not.
+fn python() -> Option<std::ffi::OsString> {
+    let python = std::env::var_os("TOILE_PYTHON");
+    if python.is_none() {
+        crate::capi_support::skip("TOILE_PYTHON is unset");
+    }
+    python
+}
+
+/// Runs a command and hands back what it printed; its failure is the test's.
+fn run(command: &mut Command) -> String {
+    let output = command
         .output()
-        .unwrap_or_else(|e| panic!("{}: {e}", Path::new(&python).display()));
+        .unwrap_or_else(|e| panic!("{}: {e}", command.get_program().display()));
     let text = format!(
         "{}{}",
         String::from_utf8_lossy(&output.stdout),
@@ -49,4 +41,94 @@ fn python_package_passes_its_tests() {
     );
     println!("{text}");
     assert!(output.status.success(), "{text}");
+    text
+}
+
+#[test]
+fn python_package_passes_its_tests() {
+    let Some(python) = python() else { return };
+    let library = library();
+    assert!(library.is_file(), "{} is not built", library.display());
+    let package = Path::new(env!("CARGO_MANIFEST_DIR")).join("python");
+    run(Command::new(&python)
+        .args(["-m", "pytest", "-q", "-p", "no:cacheprovider"])
+        .current_dir(&package)
+        .env("PYTHONPATH", &package)
+        .env("PYTHONDONTWRITEBYTECODE", "1")
+        .env("TOILE_LIBRARY", &library));
+}
+
+/// What a user does with the installed package: no source tree, no variable, the packaged library.
+const USE: &str = r#"
+import os, toile
+from toile import _ffi
+assert "TOILE_LIBRARY" not in os.environ
+assert _ffi.library_path().parent == __import__("pathlib").Path(toile.__file__).parent
+garment = toile.Garment("square", 0.05)
+garment.add_panel("square", [[0, 0], [0.3, 0], [0.3, 0.3], [0, 0.3]])
+with toile.Sim(garment) as sim:
+    sim.pin([sim.locate(0, (0, 0.3)), sim.locate(0, (0.3, 0.3))])
+    report = sim.step(0.01)
+    assert 0 < -sim.velocities[:, 1].min() < 0.2, sim.velocities
+    print("stepped", report.outcome.name, toile.__file__)
+"#;
+
+#[test]
+fn pip_installs_the_package_with_its_library_into_a_clean_environment() {
+    let Some(python) = python() else { return };
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let wheels = root.join("target/wheels");
+    if !wheels.is_dir() {
+        crate::capi_support::skip("target/wheels is not there: run scripts/tools.sh");
+        return;
+    }
+    let folder = std::env::temp_dir().join(format!("toile-pip-{}", std::process::id()));
+    let _ = std::fs::remove_dir_all(&folder);
+    let venv = folder.join("venv");
+    run(Command::new(&python).args(["-m", "venv"]).arg(&venv));
+    let bin = venv.join(if cfg!(windows) { "Scripts" } else { "bin" });
+    run(Command::new(bin.join("python"))
+        .args([
+            "-m",
+            "pip",
+            "install",
+            "--disable-pip-version-check",
+            "./python",
+        ])
+        .current_dir(root)
+        // from the folder of wheels alone
+        .env("PIP_NO_INDEX", "1")
+        .env("PIP_FIND_LINKS", &wheels)
+        .env("PIP_CONSTRAINT", "")
+        .env("TOILE_LIBRARY", library()));
+    let said = run(Command::new(bin.join("python"))
+        .args(["-c", USE])
+        .current_dir(&folder)
+        .env_remove("TOILE_LIBRARY")
+        .env_remove("PYTHONPATH"));
+    assert!(said.contains("stepped") && said.contains("site-packages"));
+    // a library that is not there is named, not left out
+    let output = Command::new(bin.join("python"))
+        .args([
+            "-m",
+            "pip",
+            "install",
+            "--disable-pip-version-check",
+            "--force-reinstall",
+        ])
+        .args(["--no-deps", "./python"])
+        .current_dir(root)
+        .env("PIP_NO_INDEX", "1")
+        .env("PIP_FIND_LINKS", &wheels)
+        .env("TOILE_LIBRARY", "/nowhere/libtoile.so")
+        .output()
+        .unwrap();
+    assert!(!output.status.success());
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    let text = text + &String::from_utf8_lossy(&output.stdout);
+    assert!(
+        text.contains("/nowhere/libtoile.so is not a file"),
+        "{text}"
+    );
+    let _ = std::fs::remove_dir_all(&folder);
 }

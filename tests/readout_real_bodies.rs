@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use toile::math::Vec3;
 use toile::readout::picture::{PictureOptions, render};
-use toile::readout::{Part, crossings, export, surface};
+use toile::readout::{Part, crossings, export};
 
 fn data() -> Option<PathBuf> {
     let found = std::env::var_os("TOILE_DATA").map(PathBuf::from);
@@ -76,15 +76,15 @@ fn shirt_on_body_is_drawn_with_both_colours_in_it() {
         let blue = shares(&|p| i32::from(p[2]) - i32::from(p[0]) > 40);
         let orange = shares(&|p| i32::from(p[0]) - i32::from(p[2]) > 60);
         assert!(blue > 0.02 && orange > 0.02, "{blue} {orange}");
-        let glb = export::gltf::to_glb(&parts, None).unwrap();
+        let glb = export::gltf::to_glb(&parts, &[]).unwrap();
         assert!(glb.len() > 12 * (x.len() + sx.len()) && glb.len().is_multiple_of(4));
-        let crossing = crossings::crossing_edges(&sx, &surface::edges(&st), &x, &t);
+        let crossing = crossings::crossing_edges(&sx, &toile::math::topology::edges(&st), &x, &t);
         println!(
             "{body}: {} edges of the flat shirt cross it",
             crossing.len()
         );
         // every edge found does cross: brute force over a few of them
-        let edges = surface::edges(&st);
+        let edges = toile::math::topology::edges(&st);
         for &e in crossing.iter().take(20) {
             let [a, b] = edges[e].map(|i| sx[i as usize]);
             assert!(

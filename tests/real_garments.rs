@@ -57,7 +57,7 @@ fn drapes_to_rest(name: &str, edge_length: f64) {
     }
     println!("{name}: moved {:.3} mm in a further second", 1e3 * moved);
     assert!(moved < 1e-3, "a vertex moved {moved} m in a further second");
-    let edges: Vec<(Vec3, Vec3)> = toile::tri::quality::edges(sim.mesh())
+    let edges: Vec<(Vec3, Vec3)> = toile::math::topology::edges(&sim.mesh().triangles)
         .iter()
         .map(|e| {
             (

@@ -1,13 +1,8 @@
 //! Bending against first principles: cylinders at any angle, the heavy elastica of a clamped strip.
 
 #![allow(clippy::expect_used, reason = "a test may stop here")]
-#![allow(unreachable_pub, reason = "helpers shared by several test files")]
 
-mod sheets;
-#[path = "sheets/statics.rs"]
-mod statics;
-
-use sheets::{Flat, NoBodies, PATTERNS, Pattern, mesh, panel, rectangle};
+use crate::sheets::{Flat, NoBodies, PATTERNS, Pattern, mesh, panel, rectangle};
 use toile::cloth::Cloth;
 use toile::math::{Vec2, Vec3};
 use toile::pattern::{BendingModel, Fabric, Garment};
@@ -52,7 +47,7 @@ fn fabric(model: BendingModel, warp: f64, weft: f64) -> Fabric {
 /// and the area over theirs, so that the border does not hide an error.
 fn cylinder_ratio(pattern: Pattern, model: BendingModel, angle: f64, b: [f64; 2]) -> f64 {
     let (l, n, radius) = (0.2, 24, 0.1);
-    let cloth = sheets::sheet(pattern, l, l, n, fabric(model, b[1], b[0]));
+    let cloth = crate::sheets::sheet(pattern, l, l, n, fabric(model, b[1], b[0]));
     let d = Vec2::new(angle.cos(), angle.sin());
     let x: Vec<Vec3> = cloth
         .mesh
@@ -226,7 +221,7 @@ fn cantilever(pattern: Pattern, model: BendingModel, gamma: f64, n: usize, m: us
         .collect();
     let fixed: Vec<bool> = cloth.mesh.uv.iter().map(|p| p.x.abs() < 1e-12).collect();
     let tolerance = (1e-8 * weight * LENGTH * LENGTH).max(2e-13);
-    let out = statics::relax(&terms, &mut x, &fixed, &world, tolerance, 300);
+    let out = crate::sheets::statics::relax(&terms, &mut x, &fixed, &world, tolerance, 300);
     assert!(
         out.residual <= tolerance,
         "{pattern:?} {model:?} {gamma} {n}: residual {}",

@@ -1,13 +1,8 @@
 //! Membrane against first principles: uniform strain on any mesh, a sheet that hangs by its weight.
 
 #![allow(clippy::expect_used, reason = "a test may stop here")]
-#![allow(unreachable_pub, reason = "helpers shared by several test files")]
 
-mod sheets;
-#[path = "sheets/statics.rs"]
-mod statics;
-
-use sheets::{NoBodies, PATTERNS, Random};
+use crate::sheets::{NoBodies, PATTERNS, Random};
 use toile::math::{Mat2, Vec3};
 use toile::pattern::Fabric;
 use toile::system::gravity::Gravity;
@@ -42,7 +37,7 @@ fn uniform_strain_is_exact_on_every_mesh() {
     );
     let (l, w, n) = (0.2, 0.15, 8);
     for pattern in PATTERNS {
-        let cloth = sheets::sheet(pattern, l, w, n, fabric.clone());
+        let cloth = crate::sheets::sheet(pattern, l, w, n, fabric.clone());
         let mut random = Random::new(3);
         let exact: Vec<Vec3> = cloth
             .mesh
@@ -66,7 +61,7 @@ fn uniform_strain_is_exact_on_every_mesh() {
             .collect();
         let terms: Vec<Box<dyn Term>> = vec![Box::new(Membrane::new(&cloth))];
         let still = world(Vec3::zeros());
-        let out = statics::relax(&terms, &mut x, &fixed, &still, 1e-11, 100);
+        let out = crate::sheets::statics::relax(&terms, &mut x, &fixed, &still, 1e-11, 100);
         assert!(out.residual < 1e-11, "{pattern:?}: {}", out.residual);
         let off = x
             .iter()
@@ -112,7 +107,7 @@ fn a_hanging_sheet_stretches_by_its_weight() {
     let want = hanging_stretch(fabric.density * 9.81 * l / fabric.weft);
     for pattern in PATTERNS {
         let errors = [8, 16, 32].map(|n| {
-            let cloth = sheets::sheet(pattern, l, w, n, fabric.clone());
+            let cloth = crate::sheets::sheet(pattern, l, w, n, fabric.clone());
             let terms: Vec<Box<dyn Term>> = vec![
                 Box::new(Membrane::new(&cloth)),
                 Box::new(Gravity::new(&cloth)),
@@ -126,7 +121,7 @@ fn a_hanging_sheet_stretches_by_its_weight() {
                 .collect();
             let fixed: Vec<bool> = cloth.mesh.uv.iter().map(|p| p.x < 1e-9).collect();
             let down = world(Vec3::new(0.0, 0.0, -9.81));
-            let out = statics::relax(&terms, &mut x, &fixed, &down, 1e-10, 200);
+            let out = crate::sheets::statics::relax(&terms, &mut x, &fixed, &down, 1e-10, 200);
             assert!(out.residual < 1e-10, "{pattern:?} {n}: {}", out.residual);
             let tip: Vec<f64> = x
                 .iter()

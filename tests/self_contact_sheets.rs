@@ -2,15 +2,14 @@
 
 #![allow(clippy::expect_used, reason = "test code")]
 
-mod self_contact_cases;
-
-use self_contact_cases::{Random, at, squares, state};
+use crate::self_contact_cases::{Random, at, squares, state};
 use std::time::Instant;
 use toile::cloth::Cloth;
 use toile::math::block::{BlockMatrix, BlockPattern};
+use toile::math::topology::edges;
 use toile::math::{Mat3, Vec3};
 use toile::solve::linear::choose::solver;
-use toile::system::contact::crossing::{crossings, crossings_with, edges, passes};
+use toile::system::contact::crossing::{crossings, crossings_with, passes};
 use toile::system::contact::self_contact::SelfContact;
 use toile::system::state::State;
 use toile::system::term::{HessianKind, Term};

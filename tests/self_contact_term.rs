@@ -2,9 +2,7 @@
 
 #![allow(clippy::expect_used, reason = "test code")]
 
-mod self_contact_cases;
-
-use self_contact_cases::{Random, at, sew, squares, state};
+use crate::self_contact_cases::{Random, at, sew, squares, state};
 use toile::math::{Mat3, Vec3};
 use toile::system::contact::self_contact::SelfContact;
 use toile::system::contact::spheres::{Grid, Spheres, covering_radius};
@@ -186,7 +184,7 @@ fn no_place_of_an_edge_or_triangle_is_out_of_reach() {
     }
     let cloth = squares(1, 5, SPACING);
     let spheres = Spheres::new(&cloth, 0.15).expect("valid");
-    let edges = toile::system::contact::crossing::edges(&cloth.mesh.triangles);
+    let edges = toile::math::topology::edges(&cloth.mesh.triangles);
     let length =
         |e: &[u32; 2]| (cloth.mesh.uv[e[0] as usize] - cloth.mesh.uv[e[1] as usize]).norm();
     let mut tightest = f64::INFINITY;

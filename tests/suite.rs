@@ -1,6 +1,18 @@
 //! All tests that can share a process, one module for each file.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may panic")]
-#![allow(clippy::duplicate_mod, reason = "every file names the helpers it uses")]
+#![allow(
+    unreachable_pub,
+    reason = "helpers are shared by the modules of this program"
+)]
+
+// what several of them use
+mod capi_support;
+mod common_data;
+mod linear_cases;
+mod self_contact_cases;
+mod sheets;
+mod terms_cases;
+mod tri_common;
 
 #[path = "abi.rs"]
 mod abi;
@@ -18,7 +30,10 @@ mod c_examples;
 mod capi_contract;
 #[path = "capi_random_calls.rs"]
 mod capi_random_calls;
-mod capi_support;
+#[path = "capi_refusals.rs"]
+mod capi_refusals;
+#[path = "capi_results.rs"]
+mod capi_results;
 #[path = "capi_threads.rs"]
 mod capi_threads;
 #[path = "cli_toile.rs"]
@@ -55,6 +70,10 @@ mod real_garments;
 mod reference_bending;
 #[path = "reference_membrane.rs"]
 mod reference_membrane;
+#[path = "scene_motion.rs"]
+mod scene_motion;
+#[path = "scene_motion_errors.rs"]
+mod scene_motion_errors;
 #[path = "scene_reader.rs"]
 mod scene_reader;
 #[path = "self_contact_sheets.rs"]
@@ -65,6 +84,8 @@ mod self_contact_term;
 mod terms_fd;
 #[path = "terms_physics.rs"]
 mod terms_physics;
+#[path = "terms_symmetry.rs"]
+mod terms_symmetry;
 #[path = "tri_garments.rs"]
 mod tri_garments;
 #[path = "tri_real.rs"]

@@ -1,11 +1,8 @@
 //! What single terms promise in plain mechanics.
 
 #![allow(clippy::expect_used, reason = "a test may stop here")]
-#![allow(unreachable_pub, reason = "helpers shared by several test files")]
 
-mod sheets;
-
-use sheets::{NoBodies, Pattern, mesh, panel, rectangle};
+use crate::sheets::{NoBodies, Pattern, mesh, panel, rectangle};
 use toile::cloth::Cloth;
 use toile::math::Vec3;
 use toile::pattern::{Fabric, Garment};
@@ -29,7 +26,7 @@ fn total(term: &dyn Term, at: &Configuration<'_>) -> Vec3 {
 }
 
 fn sheet() -> (Cloth, Vec<Vec3>) {
-    let cloth = sheets::sheet(Pattern::Squares, 0.5, 0.3, 6, Fabric::default());
+    let cloth = crate::sheets::sheet(Pattern::Squares, 0.5, 0.3, 6, Fabric::default());
     let x = cloth.mesh.placed.clone();
     (cloth, x)
 }

@@ -1,8 +1,6 @@
 //! Triangulation of the project's own and of awkward garments.
 
-#[path = "tri_common/mod.rs"]
-mod tri_common;
-
+use crate::tri_common::{check_mesh, check_transfer};
 use std::path::Path;
 use toile::error::Status;
 use toile::math::Vec2;
@@ -11,7 +9,6 @@ use toile::pattern::import::garment_from_file;
 use toile::pattern::{Edge, EdgeRef, Fabric, Garment, Panel, Seam};
 use toile::tri::grid::{rectangle, sheet_garment};
 use toile::tri::triangulate;
-use tri_common::{check_mesh, check_transfer};
 
 fn example(name: &str) -> Garment {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -223,4 +220,64 @@ fn sizes_are_refused_before_memory_is_taken() {
     // a scale far above the garment still gives a mesh of it
     let mesh = triangulate(&garment, 1e6, 10_000).unwrap();
     check_mesh(&garment, &mesh);
+}
+
+#[test]
+fn a_panel_that_cannot_be_refined_as_asked_is_named() {
+    // room for fewer vertices than good angles need: refinement gives in angle by angle. Which of
+    // these shapes can do with fewer is for the refinement to say; one at least must.
+    let shapes: [&[[f64; 2]]; 3] = [
+        &[
+            [0.0, 0.0],
+            [0.3, 0.0],
+            [0.3, 0.2],
+            [0.299, 0.201],
+            [0.0, 0.2],
+        ],
+        &[[0.0, 0.0], [0.5, 0.0], [0.5, 0.05]],
+        &[
+            [0.0, 0.0],
+            [0.2, 0.01],
+            [0.4, 0.0],
+            [0.21, 0.02],
+            [0.2, 0.3],
+            [0.19, 0.02],
+        ],
+    ];
+    let mut found = None;
+    for shape in shapes {
+        for h in [0.2, 0.05, 0.02] {
+            let mut sewn = garment(vec![polygon(shape)], vec![], h);
+            sewn.panels[0].name = "needle".into();
+            let free = triangulate(&sewn, 1.0, 200_000).unwrap();
+            assert_eq!(free.lowered, []);
+            for limit in free.uv.len() / 2..free.uv.len() {
+                let mesh = triangulate(&sewn, 1.0, limit);
+                if let Ok(mesh) = mesh.map_err(|e| assert_eq!(e.status, Status::Limit)) {
+                    println!("{h} m: {limit} of {} vertices", free.uv.len());
+                    found = Some((sewn.clone(), mesh, limit));
+                }
+            }
+        }
+    }
+    let (sewn, tight, limit) = found.unwrap();
+    assert_eq!(tight.lowered.len(), 1);
+    let lowered = tight.lowered[0];
+    assert_eq!(lowered.panel, 0);
+    assert!((lowered.asked.to_degrees() - 30.0).abs() < 1e-9);
+    assert!(lowered.kept < lowered.asked);
+
+    let settings = toile::sim::Settings {
+        max_vertices: limit as f64,
+        ..Default::default()
+    };
+    let options = toile::sim::SimOptions {
+        settings,
+        ..Default::default()
+    };
+    let notes = toile::sim::Sim::new(&sewn, &options).unwrap().info().notes;
+    assert_eq!(notes.len(), 1);
+    for words in ["panel 0 'needle'", "30 were asked"] {
+        assert!(notes[0].contains(words), "{words}: {notes:?}");
+    }
 }

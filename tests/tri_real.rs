@@ -1,15 +1,10 @@
 //! Triangulation of real patterns: quality, size, area, seams, transfer.
 
-#[path = "common_data/mod.rs"]
-mod common_data;
-#[path = "tri_common/mod.rs"]
-mod tri_common;
-
-use common_data::data_dir;
+use crate::common_data::data_dir;
+use crate::tri_common::{check_mesh, check_transfer};
 use toile::pattern::import::garment_from_file;
 use toile::tri::quality::edge_lengths;
 use toile::tri::triangulate;
-use tri_common::{check_mesh, check_transfer};
 
 const FILES: [&str; 5] = [
     "garmentcode/gen_tshirt_specification.json",

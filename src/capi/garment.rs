@@ -1,21 +1,17 @@
-//! Garments: built panel by panel or read from JSON, edited, written.
+//! Garments: made, built panel by panel, edited. What is read of them stands in
+//! `garment_readout`.
 
 use super::desc;
 use super::guard::{entry, guard};
 use super::handle::Table;
 use super::input;
 use super::output;
+use super::panel::{LARGEST_PANEL, panel};
 use super::status::{TOILE_NONE, toile_status};
-use super::types::{
-    TOILE_EDGE_ARC, TOILE_EDGE_CUBIC, TOILE_EDGE_LINE, TOILE_EDGE_QUADRATIC, toile_garment,
-    toile_garment_desc, toile_panel_desc, toile_seam_desc,
-};
+use super::types::{toile_garment, toile_garment_desc, toile_panel_desc, toile_seam_desc};
 use crate::error::{Error, Result};
-use crate::math::{Rotation, Vec2, Vec3};
-use crate::pattern::curve::Curve;
-use crate::pattern::{
-    BlendRegion, Edge, EdgeRef, Fabric, Garment, Panel, Placement, Seam, export, import,
-};
+use crate::math::Vec2;
+use crate::pattern::{BlendRegion, EdgeRef, Fabric, Garment, Panel, Seam, import};
 use std::ffi::c_char;
 use std::ptr;
 
@@ -23,20 +19,17 @@ use std::ptr;
 #[derive(Debug)]
 pub(super) struct GarmentObject {
     pub(super) garment: Garment,
-    warnings: Vec<String>,
+    pub(super) warnings: Vec<String>,
 }
 
 pub(super) static GARMENTS: Table<GarmentObject> = Table::new(0x71, "garment");
-
-/// Most corners, edges or holes of one panel.
-const LARGEST_PANEL: usize = 1 << 20;
 
 pub(super) fn insert(garment: Garment, warnings: Vec<String>) -> Result<*mut toile_garment> {
     let object = GarmentObject { garment, warnings };
     Ok(ptr::without_provenance_mut(GARMENTS.insert(object)?))
 }
 
-fn read<R>(
+pub(super) fn read<R>(
     garment: *const toile_garment,
     f: impl FnOnce(&GarmentObject) -> Result<R>,
 ) -> Result<R> {
@@ -74,14 +67,14 @@ fn edit_saying<R>(
     })
 }
 
-fn index(count: usize, what: &str) -> Result<u32> {
+pub(super) fn index(count: usize, what: &str) -> Result<u32> {
     u32::try_from(count)
         .ok()
         .filter(|&i| i != TOILE_NONE)
         .ok_or_else(|| Error::limit(format!("too many {what}: {count}")))
 }
 
-fn panel_of(garment: &Garment, panel: u32) -> Result<&Panel> {
+pub(super) fn panel_of(garment: &Garment, panel: u32) -> Result<&Panel> {
     garment.panels.get(panel as usize).ok_or_else(|| {
         Error::argument(format!(
             "panel {panel} does not exist: the garment has {}",
@@ -167,165 +160,6 @@ pub unsafe extern "C" fn toile_garment_add_panel(
         }
         Ok(())
     })
-}
-
-/// A panel from its description; everything about it that does not need the garment is checked.
-unsafe fn panel(desc: &toile_panel_desc) -> Result<Panel> {
-    const LIMIT: usize = LARGEST_PANEL;
-    input::reserved(desc.reserved)?;
-    // SAFETY: the description's pointers are the caller's, as the header asks.
-    let (name, vertices, pairs, kinds, controls, holes) = unsafe {
-        let kinds = if desc.edge_kinds.is_null() {
-            &[]
-        } else {
-            input::array(desc.edge_kinds, desc.edge_count, LIMIT, "edge_kinds")?
-        };
-        let controls = if desc.edge_controls.is_null() {
-            Vec::new()
-        } else {
-            controls(desc.edge_controls, desc.edge_count, kinds)?
-        };
-        (
-            input::optional_name(desc.name, "name")?.unwrap_or_default(),
-            input::points::<2>(desc.vertices, desc.vertex_count, LIMIT, "vertices")?,
-            input::array(
-                desc.edges.cast::<[u32; 2]>(),
-                desc.edge_count,
-                LIMIT,
-                "edges",
-            )?,
-            kinds,
-            controls,
-            input::array(desc.hole_sizes, desc.hole_count, LIMIT, "hole_sizes")?,
-        )
-    };
-    if vertices.len() < 2 {
-        return Err(Error::geometry(format!(
-            "panel '{name}': {} corners cannot enclose anything",
-            vertices.len()
-        )));
-    }
-
-    // edges, straight around the corners if none are given
-    let corner_count = vertices.len();
-    let mut edges = Vec::with_capacity(pairs.len().max(corner_count));
-    if pairs.is_empty() {
-        if !kinds.is_empty() || !holes.is_empty() {
-            return Err(Error::argument(format!(
-                "panel '{name}': edge kinds or holes without edges"
-            )));
-        }
-        for i in 0..corner_count {
-            edges.push(Edge {
-                start: i as u32,
-                end: ((i + 1) % corner_count) as u32,
-                curve: Curve::Line,
-                label: None,
-            });
-        }
-    }
-    for (i, &[start, end]) in pairs.iter().enumerate() {
-        for corner in [start, end] {
-            if corner as usize >= corner_count {
-                return Err(Error::geometry(format!(
-                    "panel '{name}': edge {i} uses corner {corner} of {corner_count}"
-                )));
-            }
-        }
-        let kind = kinds.get(i).copied().unwrap_or(TOILE_EDGE_LINE);
-        let curve = curve(kind, controls.get(i), i).map_err(|e| e.at(format!("panel '{name}'")))?;
-        edges.push(Edge {
-            start,
-            end,
-            curve,
-            label: None,
-        });
-    }
-
-    // loops: the outline has what the holes leave
-    let in_holes: u64 = holes.iter().map(|&n| u64::from(n)).sum();
-    if in_holes >= edges.len() as u64 {
-        return Err(Error::geometry(format!(
-            "panel '{name}': the holes have {in_holes} of {} edges, which leaves no outline",
-            edges.len()
-        )));
-    }
-    let mut rest = edges.split_off(edges.len() - in_holes as usize).into_iter();
-    let holes = holes
-        .iter()
-        .map(|&n| rest.by_ref().take(n as usize).collect())
-        .collect();
-
-    input::finite_all(&desc.position, "position")?;
-    let [x, y, z, w] = input::quaternion(desc.quaternion_xyzw, "quaternion_xyzw")?;
-    let rotation = Rotation::new_normalize(nalgebra::Quaternion::new(w, x, y, z));
-    Ok(Panel {
-        name: name.to_owned(),
-        vertices: vertices.iter().map(|&[u, v]| Vec2::new(u, v)).collect(),
-        outline: edges,
-        holes,
-        placement: Placement {
-            rotation,
-            translation: Vec3::from(desc.position),
-        },
-        fabric: desc.fabric as usize,
-        grain: input::finite(desc.grain, "grain")?,
-        edge_length: match input::not_negative(desc.edge_length, "edge_length")? {
-            0.0 => None,
-            length => Some(length),
-        },
-        label: None,
-    })
-}
-
-/// Control numbers of the edges, finite where the kind uses them.
-unsafe fn controls(from: *const f64, count: usize, kinds: &[u32]) -> Result<Vec<[f64; 4]>> {
-    // SAFETY: handed on.
-    let all = unsafe {
-        input::array(
-            from.cast::<[f64; 4]>(),
-            count,
-            LARGEST_PANEL,
-            "edge_controls",
-        )?
-    };
-    for (i, numbers) in all.iter().enumerate() {
-        let used = match kinds.get(i) {
-            Some(&TOILE_EDGE_QUADRATIC) => 2,
-            Some(&TOILE_EDGE_CUBIC) => 4,
-            Some(&TOILE_EDGE_ARC) => 3,
-            _ => 0,
-        };
-        input::finite_all(&numbers[..used], &format!("edge_controls[{i}]"))?;
-    }
-    Ok(all.to_vec())
-}
-
-fn curve(kind: u32, controls: Option<&[f64; 4]>, edge: usize) -> Result<Curve> {
-    if kind == TOILE_EDGE_LINE {
-        return Ok(Curve::Line);
-    }
-    let bit = |x: f64, what: &str| match x {
-        0.0 => Ok(false),
-        1.0 => Ok(true),
-        _ => Err(Error::argument(format!(
-            "edge {edge}: {what} = {x} must be 0 or 1"
-        ))),
-    };
-    let c = controls
-        .ok_or_else(|| Error::argument(format!("edge {edge} is curved, edge_controls is NULL")))?;
-    match kind {
-        TOILE_EDGE_QUADRATIC => Ok(Curve::Quadratic(Vec2::new(c[0], c[1]))),
-        TOILE_EDGE_CUBIC => Ok(Curve::Cubic(Vec2::new(c[0], c[1]), Vec2::new(c[2], c[3]))),
-        TOILE_EDGE_ARC => Ok(Curve::Arc {
-            radius: input::positive(c[0], "radius")?,
-            large: bit(c[1], "larger arc")?,
-            right: bit(c[2], "bulge to the right")?,
-        }),
-        _ => Err(Error::argument(format!(
-            "edge {edge}: {kind} is not a kind of edge"
-        ))),
-    }
 }
 
 /// Sews two edges together. `out_seam`, which may be NULL, gets the seam's index.
@@ -507,132 +341,6 @@ pub unsafe extern "C" fn toile_garment_clear_blend_region(
         write(garment, |object| {
             object.garment.blend_regions.clear();
             Ok(())
-        })
-    })
-}
-
-/// Refuses a garment that cannot be, naming panel, edge or seam, as toile_sim_create would.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn toile_garment_check(garment: *const toile_garment) -> toile_status {
-    entry!({ read(garment, |object| object.garment.check()) })
-}
-
-/// Number of panels.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn toile_garment_panel_count(
-    garment: *const toile_garment,
-    out_count: *mut u32,
-) -> toile_status {
-    entry!({
-        input::target(out_count, "out_count")?;
-        let count = read(garment, |o| index(o.garment.panels.len(), "panels"))?;
-        output::put(out_count, count);
-        Ok(())
-    })
-}
-
-/// Number of seams.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn toile_garment_seam_count(
-    garment: *const toile_garment,
-    out_count: *mut u32,
-) -> toile_status {
-    entry!({
-        input::target(out_count, "out_count")?;
-        let count = read(garment, |o| index(o.garment.seams.len(), "seams"))?;
-        output::put(out_count, count);
-        Ok(())
-    })
-}
-
-/// Index of the panel of this name (UTF-8, ends with NUL). TOILE_E_ARGUMENT if there is none.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn toile_garment_panel_index(
-    garment: *const toile_garment,
-    name: *const c_char,
-    out_panel: *mut u32,
-) -> toile_status {
-    entry!({
-        GARMENTS.get(garment.addr())?;
-        input::target(out_panel, "out_panel")?;
-        let name = input::name(name, "name")?;
-        let found = read(garment, |object| {
-            let position = object.garment.panels.iter().position(|p| p.name == name);
-            match position {
-                Some(i) => index(i, "panels"),
-                None => Err(Error::argument(format!("there is no panel '{name}'"))),
-            }
-        })?;
-        output::put(out_panel, found);
-        Ok(())
-    })
-}
-
-/// Name of a panel, UTF-8. `needed` gets the bytes, the final NUL included; `out` NULL asks for it.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn toile_garment_panel_name(
-    garment: *const toile_garment,
-    panel: u32,
-    out: *mut c_char,
-    capacity: usize,
-    needed: *mut usize,
-) -> toile_status {
-    entry!({
-        read(garment, |object| {
-            let name = &panel_of(&object.garment, panel)?.name;
-            output::copy_text(name, out, capacity, needed)
-        })
-    })
-}
-
-/// What the garment's and its fabrics' files contained that is not used: lines of UTF-8 text, empty for nothing.
-/// `needed` gets the bytes, the final NUL included; `out` NULL asks for it.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn toile_garment_warnings(
-    garment: *const toile_garment,
-    out: *mut c_char,
-    capacity: usize,
-    needed: *mut usize,
-) -> toile_status {
-    entry!({
-        read(garment, |object| {
-            output::copy_text(&object.warnings.join("\n"), out, capacity, needed)
-        })
-    })
-}
-
-/// The garment as JSON that toile_garment_from_json reads back, UTF-8. `needed` gets the bytes, the
-/// final NUL included; `out` NULL asks for it; a smaller `capacity` is TOILE_E_SIZE.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn toile_garment_to_json(
-    garment: *const toile_garment,
-    out: *mut c_char,
-    capacity: usize,
-    needed: *mut usize,
-) -> toile_status {
-    entry!({
-        read(garment, |object| {
-            let text = export::garment_to_json(&object.garment)?;
-            output::copy_text(&text, out, capacity, needed)
-        })
-    })
-}
-
-/// The flat pattern as SVG at full size, with this seam allowance [m] around every panel; 0 for
-/// none. `needed` gets the bytes, the final NUL included; `out` NULL asks for it.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn toile_garment_to_svg(
-    garment: *const toile_garment,
-    seam_allowance: f64,
-    out: *mut c_char,
-    capacity: usize,
-    needed: *mut usize,
-) -> toile_status {
-    entry!({
-        read(garment, |object| {
-            let allowance = input::not_negative(seam_allowance, "seam_allowance")?;
-            let text = export::to_svg(&object.garment, allowance)?;
-            output::copy_text(&text, out, capacity, needed)
         })
     })
 }

@@ -14,7 +14,8 @@
 //! * [`input`], [`output`]: what the caller passes is measured (NULL, alignment, count, NaN) before
 //!   a slice is made of it, and copied before an object is locked for writing, because it may point
 //!   into that very object (a view).
-//! * one file for each object: [`garment`], [`body`], [`sim`], [`motion`], [`readout`].
+//! * one file for each object: [`garment`] (with `panel` and [`garment_readout`]), [`body`], [`sim`]
+//!   (with [`motion`] and [`readout`]).
 //!
 //! The comments of exported items are the header's text: they are written for C readers, and name
 //! the unit and the shape of every array.
@@ -38,9 +39,11 @@ mod handle;
 mod input;
 mod log;
 mod output;
+mod panel;
 
 pub mod body;
 pub mod garment;
+pub mod garment_readout;
 pub mod motion;
 pub mod readout;
 pub mod sim;
@@ -49,6 +52,7 @@ pub mod types;
 
 pub use body::*;
 pub use garment::*;
+pub use garment_readout::*;
 pub use motion::*;
 pub use readout::*;
 pub use sim::*;

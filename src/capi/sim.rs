@@ -6,7 +6,7 @@ use super::garment::{self, GARMENTS};
 use super::guard::{entry, guard};
 use super::handle::Table;
 use super::input::{self, LARGEST_COUNT};
-use super::log::{Log, TOILE_LOG_ERROR, TOILE_LOG_INFO};
+use super::log::{Log, TOILE_LOG_ERROR, TOILE_LOG_INFO, TOILE_LOG_WARNING};
 use super::output;
 use super::status::toile_status;
 use super::types::{toile_body, toile_contact_desc, toile_garment, toile_sim, toile_sim_desc};
@@ -91,6 +91,9 @@ unsafe fn give(sim: Sim, log: Log, out: *mut *mut toile_sim) -> Result<()> {
             info.backend
         )
     });
+    for note in sim.info().notes {
+        log.say(TOILE_LOG_WARNING, || note.clone());
+    }
     let handle = ptr::without_provenance_mut(SIMS.insert(SimObject { sim, log, moved: 0 })?);
     // SAFETY: checked by the caller.
     unsafe { output::put(out, handle) };
@@ -195,7 +198,9 @@ pub unsafe extern "C" fn toile_sim_set_body_sdf(
 }
 
 /// Says where a body is to be at the end of the next step: position [m] of its origin and rotation
-/// x, y, z, w. Before the first step: where it is. The cloth feels the velocity that follows.
+/// x, y, z, w. The cloth feels the velocity that follows. Before the first step or drape it is a
+/// placement: the body stands there at once and has no velocity. A drape takes the body to its pose
+/// before it begins.
 ///
 /// cbindgen:ptrs-as-arrays=[[position; 3], [quaternion_xyzw; 4]]
 #[unsafe(no_mangle)]
@@ -216,7 +221,7 @@ pub unsafe extern "C" fn toile_sim_set_body_pose(
 
 /// Says where the vertices of a mesh body are to be at the end of the next step, in the body's
 /// frame [m], shape [vertex_count, 3]. `vertex_count` must be the body's. The cloth feels the
-/// velocities that follow.
+/// velocities that follow; before the first step or drape it is a placement, as with a pose.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn toile_sim_set_body_vertices(
     sim: *mut toile_sim,

@@ -1,5 +1,6 @@
 //! Mathematics without cloth words: small dense algebra, geometry with derivatives, plane curves,
-//! block-sparse matrices, deterministic parallel loops, finite differences.
+//! block-sparse matrices, deterministic parallel loops, finite differences, edges of
+//! triangles.
 
 pub mod block;
 pub mod boxtree;
@@ -7,6 +8,7 @@ pub mod diff;
 pub mod geometry;
 pub mod parallel;
 pub mod spd;
+pub mod topology;
 
 /// Point or vector in space, in metres unless said otherwise.
 pub type Vec3 = nalgebra::Vector3<f64>;

@@ -10,7 +10,7 @@ pub mod picture;
 pub mod plot;
 pub mod surface;
 
-use crate::math::Vec3;
+use crate::math::{Vec3, topology};
 
 /// One mesh of a picture or a model file: the garment, or a body.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -44,7 +44,7 @@ impl Part {
             colours: (0..positions.len())
                 .map(|v| palette::panel(vertex_panels.get(v).copied().unwrap_or(0)))
                 .collect(),
-            lines: surface::boundary_edges(triangles),
+            lines: topology::boundary_edges(triangles),
             cloth: true,
         }
     }

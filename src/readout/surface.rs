@@ -1,10 +1,11 @@
-//! What is read off a triangle surface: normals, edges, stretch.
+//! What is read off a triangle surface: normals, stretch.
 //!
 //! Vertex normal: the sum of the incident triangles' `(b - a) x (c - a)`, normalized; the cross
 //! product's length is twice the area, so the weights are the areas. Edge strain:
 //! `|x_b - x_a| / |X_b - X_a| - 1` with `X` the flat coordinates, shape `[edge_count]`, without a
 //! unit.
 
+use crate::math::topology::edges;
 use crate::math::{Vec2, Vec3};
 
 /// Unit vertex normals, area-weighted; zero where every incident triangle is degenerate.
@@ -24,34 +25,6 @@ pub fn normals(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
         *n = n.try_normalize(1e-300).unwrap_or_else(Vec3::zeros);
     }
     out
-}
-
-/// Every edge once, as `[smaller, larger]`, sorted.
-pub fn edges(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
-    let mut all = half_edges(triangles);
-    all.sort_unstable();
-    all.dedup();
-    all
-}
-
-/// Edges of exactly one triangle, as `[smaller, larger]`, sorted.
-pub fn boundary_edges(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
-    let mut all = half_edges(triangles);
-    all.sort_unstable();
-    all.chunk_by(|a, b| a == b)
-        .filter(|run| run.len() == 1)
-        .map(|run| run[0])
-        .collect()
-}
-
-fn half_edges(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
-    let mut all = Vec::with_capacity(3 * triangles.len());
-    for &[a, b, c] in triangles {
-        for [i, j] in [[a, b], [b, c], [c, a]] {
-            all.push([i.min(j), i.max(j)]);
-        }
-    }
-    all
 }
 
 /// Strain of each edge against the flat panel; an edge that names no vertex or has no flat length
@@ -113,13 +86,11 @@ mod tests {
     }
 
     #[test]
-    fn flat_square_has_unit_normals_five_edges_four_of_them_border() {
+    fn flat_square_has_unit_normals_and_no_strain() {
         let (x, uv, t) = square();
         for n in normals(&x, &t) {
             assert_eq!(n, Vec3::z());
         }
-        assert_eq!(edges(&t).len(), 5);
-        assert_eq!(boundary_edges(&t), [[0, 1], [0, 3], [1, 2], [2, 3]]);
         assert_eq!(max_edge_strain(&x, &uv, &t), 0.0);
     }
 

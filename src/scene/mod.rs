@@ -35,6 +35,8 @@ pub struct Scene {
     pub pins: Vec<ScenePin>,
     /// Tunables.
     pub settings: Settings,
+    /// Whether the scene says on how many threads it runs; else the host chooses.
+    pub threads_given: bool,
     /// State to start from instead of the placed panels.
     pub initial: Initial,
     /// What to run.
@@ -148,6 +150,9 @@ impl RunPlan {
     }
 }
 
+/// Name of the number of threads.
+pub const THREADS: &str = "solver.threads";
+
 /// Gravity unless a scene says otherwise [m/s^2].
 pub const GRAVITY: [f64; 3] = [0.0, -9.81, 0.0];
 
@@ -163,6 +168,7 @@ impl Scene {
             pressure: 0.0,
             pins: Vec::new(),
             settings: Settings::default(),
+            threads_given: false,
             initial: Initial::default(),
             run: RunPlan::default(),
             notes: Vec::new(),
@@ -200,6 +206,7 @@ impl Scene {
             self.run = run;
         } else {
             self.settings.set(name, value)?;
+            self.threads_given |= name == THREADS;
         }
         Ok(())
     }

@@ -141,6 +141,7 @@ impl Reader<'_> {
                     .number()
                     .and_then(|v| scene.settings.set(name, v).map_err(|e| node.error(e)));
                 self.keep(set);
+                scene.threads_given |= name == super::THREADS;
             }
         }
         if let Some(node) = object.get("fabrics") {

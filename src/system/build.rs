@@ -14,8 +14,7 @@ use super::seam_term::{SeamHinge, SeamSprings};
 use super::term::{Bodies, Term};
 use crate::cloth::Cloth;
 use crate::error::Result;
-use crate::math::Vec3;
-use crate::tri::quality::edges as unique_edges;
+use crate::math::{Vec3, topology};
 
 /// A compiled garment.
 pub struct System {
@@ -55,7 +54,7 @@ impl System {
     /// Compiles rest data; bodies come later.
     pub fn new(cloth: Cloth, options: &BuildOptions) -> Result<Self> {
         let terms = terms(&cloth, options)?;
-        let edges = unique_edges(&cloth.mesh);
+        let edges = topology::edges(&cloth.mesh.triangles);
         let rest_lengths = edges
             .iter()
             .map(|e| (cloth.mesh.uv[e[1] as usize] - cloth.mesh.uv[e[0] as usize]).norm())

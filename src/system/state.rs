@@ -51,8 +51,8 @@ pub struct BodyState {
     pub vertices: Vec<Vec3>,
     /// Deforming mesh: vertices at the end of the next step. Empty: no change.
     pub target_vertices: Vec<Vec3>,
-    /// Whether time has advanced since the body came in; before that a new pose is a placement,
-    /// afterwards a motion.
+    /// Whether a step or a drape has run since the body came in; before that a new pose is a
+    /// placement, afterwards a motion.
     pub moved_with_time: bool,
 }
 

@@ -5,11 +5,11 @@
 //! refinement (Ruppert, Chew; crate spade) then inserts circumcentres until no angle is below 30
 //! degrees and no triangle larger than the lattice allows. Angles that the outline itself makes, and
 //! triangles pinched between two pieces of it, stay as they are. Where refinement does not end, the
-//! angle limit is lowered in steps; a mesh whose area differs from its polygon's is refused.
+//! angle limit is lowered in steps, and the mesh says so; a mesh whose area differs from its polygon's is refused.
 
 use super::boundary::edge_fractions;
 use super::seam::{Side, link};
-use super::{GarmentMesh, SeamMesh, quality};
+use super::{GarmentMesh, LoweredAngle, SeamMesh, quality};
 use crate::error::{Error, Result};
 use crate::math::Vec2;
 use crate::pattern::curve::Segment;
@@ -35,6 +35,8 @@ struct PanelMesh {
     triangles: Vec<[u32; 3]>,
     /// Vertices along each edge.
     edges: Vec<Vec<u32>>,
+    /// Angle limit that refinement ended with [degrees].
+    angle_limit: f64,
 }
 
 /// Why a panel could not be meshed as cut.
@@ -140,6 +142,13 @@ fn join(
         for uv in &part.uv {
             mesh.placed.push(panel.placement.apply(uv));
             mesh.vertex_panel.push(k as u32);
+        }
+        if part.angle_limit < ANGLES[0] {
+            mesh.lowered.push(LoweredAngle {
+                panel: k as u32,
+                asked: ANGLES[0].to_radians(),
+                kept: part.angle_limit.to_radians(),
+            });
         }
         mesh.uv.extend(part.uv);
         for [a, b, c] in part.triangles {
@@ -268,7 +277,11 @@ fn mesh_panel(
             .vertices()
             .map(|v| Vec2::new(v.position().x, v.position().y))
             .collect();
-        return finish(points.len(), all, &triangles, edges, area);
+        let mesh = finish(points.len(), all, &triangles, edges, area)?;
+        return Ok(PanelMesh {
+            angle_limit: angle,
+            ..mesh
+        });
     }
     Err(Failure::Final(Error::limit(format!(
         "refinement to edges of {h} m did not end within {extra} further vertices, limit {max_vertices} in all"
@@ -359,6 +372,7 @@ fn finish(
         uv,
         triangles: triangles.iter().map(|t| t.map(|v| number[v])).collect(),
         edges,
+        angle_limit: ANGLES[0],
     })
 }
 

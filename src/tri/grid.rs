@@ -124,6 +124,7 @@ pub fn structured_sheet(
         triangles,
         seams: Vec::new(),
         min_angle: 0.0,
+        lowered: Vec::new(),
     };
     mesh.min_angle = quality::min_angle(&mesh);
     Ok(mesh)
@@ -150,7 +151,7 @@ mod tests {
                 })
                 .sum();
             assert!((area - 2.0).abs() < 1e-12, "{pattern:?} {area}");
-            let edges = quality::edges(&mesh);
+            let edges = crate::math::topology::edges(&mesh.triangles);
             let hinges = quality::hinges(&mesh);
             assert_eq!(mesh.uv.len() + mesh.triangles.len() - edges.len(), 1);
             assert_eq!(edges.len() - hinges.len(), 2 * (6 + 4));

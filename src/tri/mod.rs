@@ -35,6 +35,19 @@ pub struct GarmentMesh {
     pub panel_starts: Vec<u32>,
     /// Smallest triangle angle [rad].
     pub min_angle: f64,
+    /// Panels whose refinement ended only at a lower angle limit than asked for.
+    pub lowered: Vec<LoweredAngle>,
+}
+
+/// A panel with worse triangles than the others.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LoweredAngle {
+    /// The panel.
+    pub panel: u32,
+    /// The limit that refinement was asked for at first [rad].
+    pub asked: f64,
+    /// The limit that it ended with [rad]; 0 is none.
+    pub kept: f64,
 }
 
 /// A seam on the mesh.

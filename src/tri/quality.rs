@@ -1,7 +1,7 @@
-//! What a mesh looks like: smallest angle, edge lengths, edges, hinges.
+//! What a mesh looks like: smallest angle, edge lengths, hinges.
 
 use super::GarmentMesh;
-use crate::math::Vec2;
+use crate::math::{Vec2, topology};
 
 /// Smallest angle of all triangles in flat coordinates [rad]; half a turn for no triangles.
 pub fn min_angle(mesh: &GarmentMesh) -> f64 {
@@ -21,19 +21,6 @@ pub fn angles(corners: [Vec2; 3]) -> [f64; 3] {
         let (a, b) = (q - p, r - p);
         (a.x * b.y - a.y * b.x).abs().atan2(a.dot(&b))
     })
-}
-
-/// Every edge once, smaller vertex first, in ascending order.
-pub fn edges(mesh: &GarmentMesh) -> Vec<[u32; 2]> {
-    let mut list: Vec<[u32; 2]> = mesh
-        .triangles
-        .iter()
-        .flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]])
-        .map(|[a, b]| [a.min(b), a.max(b)])
-        .collect();
-    list.sort_unstable();
-    list.dedup();
-    list
 }
 
 /// Interior edges with their two opposite vertices, in ascending order of the edge.
@@ -74,7 +61,7 @@ pub struct EdgeLengths {
 
 /// Lengths of all edges with a histogram of `bins` (at least 1).
 pub fn edge_lengths(mesh: &GarmentMesh, bins: usize) -> EdgeLengths {
-    let lengths: Vec<f64> = edges(mesh)
+    let lengths: Vec<f64> = topology::edges(&mesh.triangles)
         .iter()
         .map(|[a, b]| (mesh.uv[*a as usize] - mesh.uv[*b as usize]).norm())
         .collect();

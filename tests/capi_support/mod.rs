@@ -42,11 +42,12 @@ pub fn has(program: &str) -> bool {
 }
 
 /// Source files of the C interface in the order of the header.
-pub const SOURCES: [&str; 8] = [
+pub const SOURCES: [&str; 9] = [
     "status.rs",
     "log.rs",
     "types.rs",
     "garment.rs",
+    "garment_readout.rs",
     "body.rs",
     "sim.rs",
     "motion.rs",

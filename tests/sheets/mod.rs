@@ -2,6 +2,8 @@
 
 #![allow(dead_code, reason = "every test file uses a part of it")]
 
+pub mod statics;
+
 use spade::{DelaunayTriangulation, Point2, Triangulation};
 use toile::body::Distance;
 use toile::cloth::Cloth;

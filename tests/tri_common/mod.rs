@@ -1,9 +1,10 @@
 //! Laws that every garment mesh keeps.
 
 use std::f64::consts::PI;
+use toile::math::topology::edges;
 use toile::math::{Vec2, Vec3};
 use toile::pattern::Garment;
-use toile::tri::quality::{edges, hinges};
+use toile::tri::quality::hinges;
 use toile::tri::{GarmentMesh, Transfer};
 
 fn cross(a: Vec2, b: Vec2) -> f64 {
@@ -77,7 +78,7 @@ pub(crate) fn check_mesh(garment: &Garment, mesh: &GarmentMesh) {
         assert!((area[k] - exact).abs() <= 1e-9 * exact + sagitta);
     }
     // each panel is a disc with holes: V - E + F = 1 - holes
-    let all = edges(mesh);
+    let all = edges(&mesh.triangles);
     let holes: i64 = garment.panels.iter().map(|p| p.holes.len() as i64).sum();
     let euler = mesh.uv.len() as i64 - all.len() as i64 + mesh.triangles.len() as i64;
     assert_eq!(euler, panels as i64 - holes);

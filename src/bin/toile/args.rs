@@ -67,7 +67,8 @@ pub(crate) struct SceneArgs {
     /// Target edge length of every panel [m].
     #[arg(long, value_name = "M")]
     pub(crate) edge_length: Option<f64>,
-    /// Worker threads; results do not depend on it.
+    /// Worker threads, by default as the scene says, else one for each core; results do not depend
+    /// on it.
     #[arg(long, value_name = "N")]
     pub(crate) threads: Option<u32>,
     /// Sets a number by dotted name; `toile schema` lists the names.

@@ -8,7 +8,8 @@ use std::process::ExitCode;
 use toile::body::Body;
 use toile::error::{Error, Result};
 use toile::scene::motion::BodyMotion;
-use toile::scene::{Scene, SceneBody, files};
+use toile::scene::{Scene, SceneBody, THREADS, files};
+use toile::sim::Settings;
 use toile::sim_scene;
 
 /// Puts in what the command line says beside the file.
@@ -36,12 +37,25 @@ fn apply(scene: &mut Scene, args: &SceneArgs) -> Result<()> {
         scene.set_edge_length(length)?;
     }
     if let Some(threads) = args.threads {
-        scene.set_number("solver.threads", f64::from(threads))?;
+        scene.set_number(THREADS, f64::from(threads))?;
     }
     for (name, value) in &args.set {
         scene.set_number(name, *value)?;
     }
+    if !scene.threads_given {
+        scene.settings.threads = every_core();
+    }
     Ok(())
+}
+
+/// Cores that this program may use, as many as the setting admits.
+fn every_core() -> f64 {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let most = Settings::KEYS
+        .iter()
+        .find(|k| k.name == THREADS)
+        .map_or(1.0, |k| k.max);
+    (cores as f64).min(most)
 }
 
 /// The scene of a command line.
@@ -103,7 +117,7 @@ pub(crate) fn info(args: &SceneArgs) -> Done {
             scene.run.dt
         ),
     );
-    for note in &scene.notes {
+    for note in info.notes.iter().chain(&scene.notes) {
         row("note", note.clone());
     }
     out(&text)
@@ -118,7 +132,10 @@ pub(crate) fn check(args: &SceneArgs) -> Done {
         // what only building shows: triangles, seams, pins
         if problems.is_empty() {
             let built = apply(&mut scene, args).and_then(|()| sim_scene::build(&scene));
-            problems.extend(built.err());
+            match built {
+                Ok(sim) => notes.append(&mut sim.info().notes),
+                Err(e) => problems.push(e),
+            }
         }
     }
     let mut report = String::new();

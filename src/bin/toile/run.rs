@@ -9,10 +9,10 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 use toile::error::Error;
-use toile::math::Vec3;
+use toile::math::{Vec3, topology};
 use toile::readout::export::{gltf, obj, pc2};
 use toile::readout::picture::{PictureOptions, render};
-use toile::readout::{Part, crossings, surface};
+use toile::readout::{Part, crossings};
 use toile::scene::Scene;
 use toile::sim::{DrapeOptions, Outcome, Progress, Sim, StepReport};
 use toile::sim_scene::{Driver, build};
@@ -20,17 +20,47 @@ use toile::sim_scene::{Driver, build};
 /// Time of `--verify` [s] and its step [s].
 const VERIFY: (u32, f64) = (60, 1.0 / 60.0);
 
-/// Garment frames kept for the model file and the point cache.
+/// Frames kept for the model file and the point cache.
 #[derive(Default)]
 struct Frames {
     times: Vec<f64>,
-    positions: Vec<Vec<Vec3>>,
+    garment: Vec<Vec<Vec3>>,
+    /// Bodies that move, by number.
+    bodies: Vec<(u32, Vec<Vec<Vec3>>)>,
 }
 
 impl Frames {
-    fn keep(&mut self, sim: &Sim) {
+    fn new(scene: &Scene) -> Self {
+        let moving = (0..).zip(&scene.bodies).filter(|(_, b)| b.motion.moves());
+        Self {
+            bodies: moving.map(|(i, _)| (i, Vec::new())).collect(),
+            ..Self::default()
+        }
+    }
+
+    fn keep(&mut self, sim: &Sim) -> Result<(), Error> {
         self.times.push(sim.time());
-        self.positions.push(sim.positions().to_vec());
+        self.garment.push(sim.positions().to_vec());
+        for (body, frames) in &mut self.bodies {
+            frames.push(sim.body_mesh(*body)?.0);
+        }
+        Ok(())
+    }
+
+    /// What moves, by part of the model file: the garment is part 0, then the bodies.
+    fn motions(&self) -> Vec<gltf::Animation<'_>> {
+        if self.times.is_empty() {
+            return Vec::new();
+        }
+        let bodies = self.bodies.iter().map(|(i, f)| (*i as usize + 1, f));
+        std::iter::once((0, &self.garment))
+            .chain(bodies)
+            .map(|(part, frames)| gltf::Animation {
+                part,
+                times: &self.times,
+                frames,
+            })
+            .collect()
     }
 }
 
@@ -51,23 +81,25 @@ pub(crate) fn run(args: &RunArgs) -> Done {
         summary.outcome = last.as_ref().map(|r| r.outcome);
     }
     summary.add(last.as_ref());
-    let mut frames = Frames::default();
+    let mut frames = Frames::new(&scene);
     let steps = scene.run.steps();
     let every = u64::from(scene.run.frame_every);
     if every > 0 && steps > 0 {
-        frames.keep(&sim);
+        frames.keep(&sim)?;
     }
     let origin = sim.time();
     bar.set_message("step");
     for step in 1..=steps {
         driver.set(&mut sim, &scene, origin + step as f64 * scene.run.dt)?;
-        let report = sim.step(scene.run.dt)?;
+        let report = sim
+            .step(scene.run.dt)
+            .map_err(|e| e.at(format!("step {step} of {steps}")))?;
         summary.worst(report.outcome);
         summary.add(Some(&report));
         summary.steps += 1;
         last = Some(report);
         if every > 0 && step % every == 0 {
-            frames.keep(&sim);
+            frames.keep(&sim)?;
         }
         bar.set_position((step as f64 / steps as f64 * 1000.0) as u64);
     }
@@ -152,21 +184,16 @@ fn write(
     let text = obj::to_obj(x, triangles, sim.vertex_uv(), sim.vertex_panels(), &names);
     file(&dir.join("garment.obj"), text.as_bytes())?;
     let mut parts = vec![Part::garment("garment", x, triangles, sim.vertex_panels())];
-    let edges = surface::edges(triangles);
+    let edges = topology::edges(triangles);
     for (i, body) in (0_u32..).zip(&scene.bodies) {
         let (positions, faces) = sim.body_mesh(i)?;
         summary.body_crossings += crossings::crossing_edges(x, &edges, &positions, &faces).len();
         parts.push(Part::body(&body.name, positions, faces));
     }
-    let animation = (!frames.times.is_empty()).then_some(gltf::Animation {
-        part: 0,
-        times: &frames.times,
-        frames: &frames.positions,
-    });
-    let glb = gltf::to_glb(&parts, animation.as_ref())?;
+    let glb = gltf::to_glb(&parts, &frames.motions())?;
     file(&dir.join("scene.glb"), &glb)?;
     if !frames.times.is_empty() {
-        file(&dir.join("garment.pc2"), &pc2::to_pc2(&frames.positions)?)?;
+        file(&dir.join("garment.pc2"), &pc2::to_pc2(&frames.garment)?)?;
     }
     let up = -Vec3::from(scene.gravity);
     let options = PictureOptions {

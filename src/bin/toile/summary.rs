@@ -83,6 +83,7 @@ impl Summary {
         put("factor_bytes", json!(info.factor_bytes));
         put("threads", json!(self.threads as u64));
         put("backend", json!(info.backend));
+        put("notes", json!(info.notes));
         put("version", json!(env!("CARGO_PKG_VERSION")));
         Value::Object(map)
     }
@@ -112,6 +113,7 @@ pub(crate) fn table(scene: &Scene, json: &Value, dir: &Path) -> String {
         ("steps", "steps"),
         ("Newton iterations", "newton_iterations"),
         ("edges through a body", "body_crossings"),
+        ("threads", "threads"),
     ] {
         row(name, plain(key).unwrap_or_default());
     }
@@ -128,8 +130,10 @@ pub(crate) fn table(scene: &Scene, json: &Value, dir: &Path) -> String {
             row(name, format!("{:.3} {unit}", v * factor));
         }
     }
-    for note in &scene.notes {
-        row("note", note.clone());
+    let built = json.get("notes").and_then(Value::as_array);
+    let built = built.into_iter().flatten().filter_map(Value::as_str);
+    for note in built.chain(scene.notes.iter().map(String::as_str)) {
+        row("note", note.to_owned());
     }
     let _ = writeln!(text, "  results in {}", dir.display());
     text

@@ -1,8 +1,8 @@
 //! glTF 2.0 in one binary file (.glb): garment and bodies, normals, a colour for each vertex.
 //!
 //! Vertices are single precision, as the format has no other; colours are linear light as the
-//! format asks. Further frames of the garment become morph targets played by one animation, each
-//! the difference to the first.
+//! format asks. Further frames of a part become morph targets, each the difference to its own
+//! positions; one animation plays those of all parts.
 
 use crate::error::{Error, Result};
 use crate::math::Vec3;
@@ -22,16 +22,17 @@ pub struct Animation<'a> {
     pub frames: &'a [Vec<Vec3>],
 }
 
-/// The parts as a .glb file.
-pub fn to_glb(parts: &[Part], animation: Option<&Animation<'_>>) -> Result<Vec<u8>> {
+/// The parts as a .glb file; `motions` has at most one entry for a part.
+pub fn to_glb(parts: &[Part], motions: &[Animation<'_>]) -> Result<Vec<u8>> {
     let mut file = File::default();
+    let mut played = (Vec::new(), Vec::new());
     let mut nodes = Vec::new();
     for (i, part) in parts.iter().enumerate() {
         part.check()?;
         if part.positions.is_empty() || part.triangles.is_empty() {
             continue;
         }
-        let moving = animation.filter(|a| a.part == i && !a.frames.is_empty());
+        let moving = motions.iter().find(|a| a.part == i && !a.frames.is_empty());
         let mesh = file.mesh(part, moving)?;
         let node = file.root.push(json::Node {
             mesh: Some(mesh),
@@ -39,9 +40,21 @@ pub fn to_glb(parts: &[Part], animation: Option<&Animation<'_>>) -> Result<Vec<u
             ..json::Node::default()
         });
         if let Some(a) = moving {
-            file.animate(node, a)?;
+            let index = Index::new(played.1.len() as u32);
+            let (channel, sampler) = file.animate(node, index, a)?;
+            played.0.push(channel);
+            played.1.push(sampler);
         }
         nodes.push(node);
+    }
+    if !played.0.is_empty() {
+        let _ = file.root.push(json::Animation {
+            extensions: None,
+            extras: Default::default(),
+            channels: played.0,
+            name: Some("motion".into()),
+            samplers: played.1,
+        });
     }
     let scene = file.root.push(json::Scene {
         extensions: None,
@@ -60,6 +73,7 @@ struct File {
 }
 
 type Accessor = Index<json::Accessor>;
+type Played = (json::animation::Channel, json::animation::Sampler);
 
 impl File {
     fn view(
@@ -221,7 +235,12 @@ impl File {
     }
 
     /// One key for each frame: its own target at weight one, all others at zero.
-    fn animate(&mut self, node: Index<json::Node>, a: &Animation<'_>) -> Result<()> {
+    fn animate(
+        &mut self,
+        node: Index<json::Node>,
+        sampler: Index<json::animation::Sampler>,
+        a: &Animation<'_>,
+    ) -> Result<Played> {
         let n = a.frames.len();
         if a.times.len() != n {
             return Err(Error::argument(format!(
@@ -255,11 +274,9 @@ impl File {
             None,
             None,
         );
-        self.root.push(json::Animation {
-            extensions: None,
-            extras: Default::default(),
-            channels: vec![json::animation::Channel {
-                sampler: Index::new(0),
+        Ok((
+            json::animation::Channel {
+                sampler,
                 target: json::animation::Target {
                     extensions: None,
                     extras: Default::default(),
@@ -268,17 +285,15 @@ impl File {
                 },
                 extensions: None,
                 extras: Default::default(),
-            }],
-            name: Some("drape".into()),
-            samplers: vec![json::animation::Sampler {
+            },
+            json::animation::Sampler {
                 extensions: None,
                 extras: Default::default(),
                 input,
                 interpolation: Valid(json::animation::Interpolation::Linear),
                 output,
-            }],
-        });
-        Ok(())
+            },
+        ))
     }
 
     /// Header, JSON chunk padded with spaces, binary chunk padded with zeros.
@@ -350,12 +365,12 @@ mod tests {
     #[test]
     fn the_file_is_valid_gltf_and_every_accessor_lies_in_the_buffer() {
         let frames = vec![part().positions, part().positions];
-        let animation = Animation {
-            part: 0,
+        let motions = [0, 1].map(|part| Animation {
+            part,
             times: &[0.0, 0.5],
             frames: &frames,
-        };
-        let (root, size) = parse(&to_glb(&[part()], Some(&animation)).unwrap());
+        });
+        let (root, size) = parse(&to_glb(&[part(), part()], &motions).unwrap());
         let mut problems = Vec::new();
         root.validate(&root, json::Path::new, &mut |path, e| {
             problems.push(format!("{} {e}", path()));
@@ -371,14 +386,18 @@ mod tests {
             Some(serde_json::json!([1.0, 1.0, 0.5]))
         );
         assert_eq!(root.animations.len(), 1);
+        for (i, channel) in root.animations[0].channels.iter().enumerate() {
+            assert_eq!(channel.sampler.value(), i);
+            assert_eq!(channel.target.node.value(), i);
+        }
     }
 
     #[test]
     fn nothing_to_show_is_still_a_file() {
-        let bytes = to_glb(&[], None).unwrap();
+        let bytes = to_glb(&[], &[]).unwrap();
         assert_eq!(&bytes[..4], b"glTF");
         let mut bad = part();
         bad.colours.pop();
-        assert!(to_glb(&[bad], None).is_err());
+        assert!(to_glb(&[bad], &[]).is_err());
     }
 }

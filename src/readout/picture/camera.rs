@@ -1,10 +1,11 @@
-//! Perspective cameras, one for each view, fitted to the garment.
+//! Perspective cameras, one for each view, fitted to the garment and the bounded bodies near it.
 //!
 //! A camera at `eye` with axes `right`, `up`, `forward` maps `x` to
 //! `(cx + f (x . right) / w, cy - f (x . up) / w)` with `w = x . forward` relative to the eye. The
 //! views share one scale: columns get widths in proportion to what they show.
 
 use super::super::Part;
+use super::backdrop::is_backdrop;
 use crate::math::Vec3;
 
 /// Half of the vertical field of view as a tangent: a long lens, so that proportions stay true.
@@ -22,9 +23,9 @@ pub(crate) struct Frame {
     pub(crate) centre: Vec3,
     /// Half extents along (side, up, front) [m].
     pub(crate) half: [f64; 3],
-    /// Lowest point of everything along `up` [m].
+    /// Lowest point of everything that has an end, along `up` [m].
     pub(crate) lowest: f64,
-    /// Highest point of everything along `up` [m].
+    /// Highest point of the same along `up` [m].
     pub(crate) highest: f64,
     /// Bounding sphere of everything: middle, radius [m].
     pub(crate) ball: (Vec3, f64),
@@ -37,7 +38,8 @@ impl Frame {
         let extent = |cloth_only: bool| {
             let mut lo = [f64::INFINITY; 3];
             let mut hi = [f64::NEG_INFINITY; 3];
-            for part in parts.iter().filter(|p| p.cloth || !cloth_only) {
+            let counts = |p: &&Part| p.cloth || !(cloth_only || is_backdrop(p));
+            for part in parts.iter().filter(counts) {
                 for x in &part.positions {
                     for k in 0..3 {
                         let c = x.dot(&axes[k]);

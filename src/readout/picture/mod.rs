@@ -2,10 +2,11 @@
 //!
 //! One picture shows the front, the side and the back beside each other. Stages: soft light for
 //! every vertex by depth maps from many directions (`light`), perspective cameras fitted to the
-//! garment (`camera`), depth-buffered triangles at twice the resolution (`raster`), shading and
+//! garment (`camera`), planes without end (`backdrop`), depth-buffered triangles at twice the resolution (`raster`), shading and
 //! lines (`shade`), box filter down to pixels. No axis but `up` is special: the front is seen from
 //! `front`, as GarmentCode bodies face +Z.
 
+mod backdrop;
 mod camera;
 mod light;
 mod raster;
@@ -30,7 +31,8 @@ pub struct PictureOptions {
     pub up: Vec3,
     /// Unit vector from the scene to the eye of the front view; orthogonal to `up`.
     pub front: Vec3,
-    /// Height of the ground along `up` [m] that catches shadows; `None` puts it under the scene.
+    /// Height of the ground along `up` [m] that catches shadows; `None` puts it under the scene,
+    /// or on the floor if there is one.
     pub ground: Option<f64>,
     /// Threads to draw with; the picture does not depend on it.
     pub threads: usize,
@@ -92,21 +94,23 @@ pub(crate) struct Scene {
     pub(crate) triangles: Vec<[u32; 3]>,
     /// Whether a triangle is cloth.
     pub(crate) cloth: Vec<bool>,
+    /// Whether a triangle is seen from its outer side only.
+    pub(crate) one_sided: Vec<bool>,
     pub(crate) lines: Vec<[u32; 2]>,
 }
 
 impl Scene {
-    fn new(parts: &[Part]) -> Result<Self> {
+    fn new(parts: &[(Part, bool)]) -> Result<Self> {
         let mut s = Self {
             positions: Vec::new(),
             normals: Vec::new(),
             colours: Vec::new(),
             triangles: Vec::new(),
             cloth: Vec::new(),
+            one_sided: Vec::new(),
             lines: Vec::new(),
         };
-        for part in parts {
-            part.check()?;
+        for (part, one_sided) in parts {
             let base = s.positions.len();
             if base + part.positions.len() > u32::MAX as usize {
                 return Err(Error::limit("more than 2^32 vertices in a picture"));
@@ -121,6 +125,8 @@ impl Scene {
                 .extend(part.triangles.iter().map(|t| t.map(|i| i + base)));
             s.cloth
                 .extend(std::iter::repeat_n(part.cloth, part.triangles.len()));
+            s.one_sided
+                .extend(std::iter::repeat_n(*one_sided, part.triangles.len()));
             s.lines
                 .extend(part.lines.iter().map(|l| l.map(|i| i + base)));
         }
@@ -144,9 +150,13 @@ pub fn render(parts: &[Part], options: &PictureOptions) -> Result<Picture> {
         .try_normalize(1e-12)
         .ok_or_else(|| Error::argument("picture: `front` is parallel to `up`"))?;
     let workers = Workers::new(options.threads.min(64));
-    let scene = Scene::new(parts)?;
+    for part in parts {
+        part.check()?;
+    }
     let frame = Frame::of(parts, &up, &front);
-    let ground = options.ground.unwrap_or(frame.lowest);
+    let (parts, ground) = backdrop::arrange(parts, &frame);
+    let scene = Scene::new(&parts)?;
+    let ground = options.ground.unwrap_or(ground);
     let floor = light::Floor::new(&frame, ground);
     let lit = light::Light::new(&scene, &floor, &frame, &options.views, &workers);
     let mut canvas = shade::Canvas::new(width * SUB, height * SUB);

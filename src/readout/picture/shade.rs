@@ -56,6 +56,9 @@ impl Canvas {
         let screen: Vec<Option<[f64; 3]>> =
             scene.positions.iter().map(|x| camera.project(x)).collect();
         for (i, t) in scene.triangles.iter().enumerate() {
+            if scene.one_sided[i] && turned_away(scene, t, &camera.eye) {
+                continue;
+            }
             let [a, b, c] = t.map(|v| screen[v as usize]);
             if let (Some(a), Some(b), Some(c)) = (a, b, c) {
                 self.buffer.triangle([a, b, c], i as u32, camera.columns);
@@ -153,6 +156,12 @@ impl Canvas {
         }
         Picture { width, height, rgb }
     }
+}
+
+/// Whether the eye is on the inner side of a triangle.
+fn turned_away(scene: &Scene, triangle: &[u32; 3], eye: &Vec3) -> bool {
+    let [a, b, c] = triangle.map(|v| scene.positions[v as usize]);
+    (b - a).cross(&(c - a)).dot(&(eye - a)) <= 0.0
 }
 
 fn surface(

@@ -195,8 +195,8 @@ fn motion(
         if motion.frames.is_empty() {
             return Err(frames.error("must name at least one file"));
         }
-    } else if let Some(rate) = moving.get("rate") {
-        return Err(rate.error("goes with frames, which are absent"));
+    } else if let Some(alone) = moving.get("rate").or_else(|| moving.get("repeat")) {
+        return Err(alone.error("goes with frames, which are absent"));
     }
     Ok(motion)
 }

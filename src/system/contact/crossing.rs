@@ -13,6 +13,7 @@
 use crate::error::{Error, Result};
 use crate::math::Vec3;
 use crate::math::boxtree::{Aabb, BoxTree};
+use crate::math::topology::edges;
 use crate::tri::GarmentMesh;
 
 /// An edge (smaller vertex first) and the triangle that it passes through.
@@ -79,18 +80,6 @@ pub fn glued_pairs(mesh: &GarmentMesh) -> Vec<[u32; 2]> {
         .flat_map(|s| &s.links)
         .flat_map(|l| l.edge.map(|e| [l.vertex, e]))
         .collect()
-}
-
-/// Every edge once, smaller vertex first, sorted.
-pub fn edges(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
-    let mut edges: Vec<[u32; 2]> = triangles
-        .iter()
-        .flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]])
-        .map(|[a, b]| [a.min(b), a.max(b)])
-        .collect();
-    edges.sort_unstable();
-    edges.dedup();
-    edges
 }
 
 fn check(triangles: &[[u32; 3]], positions: &[Vec3]) -> Result<()> {

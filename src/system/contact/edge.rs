@@ -15,8 +15,7 @@
 use super::super::state::State;
 use super::super::term::{Configuration, HessianKind, Stencils, Term};
 use crate::cloth::Cloth;
-use crate::math::{Mat3, Vec3};
-use crate::tri::quality;
+use crate::math::{Mat3, Vec3, topology};
 
 /// Contact of every edge's mid-point with every body.
 #[derive(Debug, Default)]
@@ -31,7 +30,7 @@ pub struct EdgeContact {
 impl EdgeContact {
     /// Contact for the edges of a cloth.
     pub fn new(cloth: &Cloth) -> Self {
-        let edges = quality::edges(&cloth.mesh);
+        let edges = topology::edges(&cloth.mesh.triangles);
         let mut areas = vec![0.0; edges.len()];
         for (tri, area) in cloth.mesh.triangles.iter().zip(&cloth.areas) {
             for k in 0..3 {

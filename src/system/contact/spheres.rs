@@ -32,7 +32,7 @@
 use crate::cloth::Cloth;
 use crate::error::{Error, Result};
 use crate::math::Vec3;
-use crate::system::contact::crossing::edges;
+use crate::math::topology::edges;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 

@@ -1,0 +1,79 @@
+"""What the library reports: outcomes, energies, sizes."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+from typing import Any
+
+
+class Outcome(enum.IntEnum):
+    """Why a step or a drape ended."""
+
+    CONVERGED = 0
+    SUBSTEPPED = 1
+    ITERATION_LIMIT = 2
+    CANCELLED = 3
+
+
+@dataclass(frozen=True)
+class Report:
+    """Numbers of a step or a drape."""
+
+    outcome: Outcome
+    newton_iterations: int
+    linear_iterations: int
+    substeps: int
+    #: Time advanced [s].
+    advanced: float
+    #: Largest force on a free vertex [N].
+    residual: float
+    max_edge_strain: float
+    #: Smallest distance of a vertex to a body [m]; infinite without bodies.
+    min_gap: float
+    #: [J]
+    kinetic_energy: float
+    #: [J]
+    potential_energy: float
+    #: Largest distance across a seam [m].
+    max_seam_gap: float
+
+
+@dataclass(frozen=True)
+class Energies:
+    """Energies of the present state [J]."""
+
+    kinetic: float
+    gravity: float
+    membrane: float
+    bending: float
+    seam: float
+    contact: float
+    yarn: float
+
+
+@dataclass(frozen=True)
+class SystemInfo:
+    """What was built and what it costs."""
+
+    vertices: int
+    triangles: int
+    yarn_nodes: int
+    unknowns: int
+    #: Mesh, terms and matrix.
+    bytes: int
+    #: Factor and work arrays.
+    factor_bytes: int
+    #: Smallest triangle angle [rad].
+    min_angle: float
+
+
+def _fields(value: Any) -> dict[str, Any]:
+    skip = ("struct_size", "reserved")
+    return {name: getattr(value, name) for name, _ in value._fields_ if name not in skip}
+
+
+def _report(value: Any) -> Report:
+    fields = _fields(value)
+    fields["outcome"] = Outcome(fields["outcome"])
+    return Report(**fields)

@@ -1,0 +1,286 @@
+"""Simulations: a garment in a world, stepped, draped, read."""
+
+from __future__ import annotations
+
+import ctypes
+from pathlib import Path
+from typing import Any, Callable, Optional
+
+import numpy as np
+
+from . import _ffi
+from ._arrays import Array, PathLike, _copy, _dir, _encode, _f64, _pointer, _text, _u32, _vector
+from ._body import Body
+from ._errors import _check
+from ._ffi import lib
+from ._garment import Garment
+from ._owner import _Owner
+from ._report import Energies, Report, SystemInfo, _fields, _report
+
+#: ``progress(fraction, stage, residual)``; returning ``False`` stops the drape.
+ProgressCallback = Callable[[float, str, float], Optional[bool]]
+
+
+class Sim(_Owner):
+    """A garment in a world."""
+
+    _free = lib.toile_sim_free
+
+    def __init__(
+        self,
+        garment: Garment,
+        gravity: Array = (0, -9.81, 0),
+        wind: Array = (0, 0, 0),
+        pressure: float = 0.0,
+        threads: int = 1,
+    ) -> None:
+        """Triangulates and compiles the garment. `gravity` [m/s^2], `wind` [m/s], `pressure` along
+        the cloth's normal [Pa]; results do not depend on `threads`."""
+        super().__init__()
+        desc = _ffi.new("toile_sim_desc")
+        desc.gravity = _vector(gravity, 3, "gravity")
+        desc.wind = _vector(wind, 3, "wind")
+        desc.pressure, desc.threads = pressure, threads
+        self._take(lib.toile_sim_create, garment.handle, ctypes.byref(desc))
+
+    @classmethod
+    def from_scene(cls, text: str, base_dir: Optional[PathLike] = None) -> Sim:
+        """The simulation of a scene (JSON), before anything is run."""
+        sim = cls.__new__(cls)
+        _Owner.__init__(sim)
+        data = _encode(text)
+        sim._take(lib.toile_sim_from_scene, data, len(data), _dir(base_dir))
+        return sim
+
+    @classmethod
+    def from_file(cls, path: PathLike) -> Sim:
+        """The same from a scene file."""
+        path = Path(path)
+        return cls.from_scene(path.read_text(encoding="utf-8"), path.parent)
+
+    def __enter__(self) -> Sim:
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        self.close()
+
+    def add_body(
+        self,
+        body: Body,
+        friction: Optional[float] = None,
+        thickness: Optional[float] = None,
+        stiffness: Optional[float] = None,
+    ) -> int:
+        """Puts a body into the world and returns its number. Coulomb `friction`, free gap
+        `thickness` [m], penalty `stiffness` [Pa/m]; ``None`` takes the default."""
+        desc = _ffi.new("toile_contact_desc")
+        given = {"friction": friction, "thickness": thickness, "stiffness": stiffness}
+        for name, value in given.items():
+            if value is not None:
+                setattr(desc, name, value)
+        out = ctypes.c_uint32()
+        _check(
+            lib.toile_sim_set_body_sdf(
+                self.handle, body.handle, ctypes.byref(desc), ctypes.byref(out)
+            )
+        )
+        return out.value
+
+    def set_body_pose(
+        self, body: int, position: Array, quaternion_xyzw: Array = (0, 0, 0, 1)
+    ) -> None:
+        """Where a body is at the end of the next step [m]; placed at once before the first step or
+        drape."""
+        p = _vector(position, 3, "position")
+        q = _vector(quaternion_xyzw, 4, "quaternion_xyzw")
+        _check(lib.toile_sim_set_body_pose(self.handle, body, p, q))
+
+    def set_body_vertices(self, body: int, positions: Array) -> None:
+        """Vertices of a deforming mesh at the end of the next step, body frame [m], (n, 3)."""
+        x = _f64(positions, 3, "positions")
+        _check(lib.toile_sim_set_body_vertices(self.handle, body, _pointer(x), len(x)))
+
+    def body_wrench(self, body: int) -> tuple[np.ndarray, np.ndarray]:
+        """Force [N] and torque about the body's origin [N m] of the cloth, world axes."""
+        force, torque = (ctypes.c_double * 3)(), (ctypes.c_double * 3)()
+        _check(lib.toile_sim_body_wrench(self.handle, body, force, torque))
+        return np.array(force), np.array(torque)
+
+    def body_mesh(self, body: int) -> tuple[np.ndarray, np.ndarray]:
+        """Mesh to draw a body: positions [m], shape (n, 3), triangles, shape (m, 3)."""
+        x = _copy(lib.toile_sim_body_positions, np.float64, self.handle, body)
+        t = _copy(lib.toile_sim_body_triangles, np.uint32, self.handle, body)
+        return x.reshape(-1, 3), t.reshape(-1, 3)
+
+    def pin(self, vertices: Array, targets: Optional[Array] = None) -> None:
+        """Holds vertices; `targets` [m], shape (n, 3), are reached at the end of the next step,
+        without them vertices are held where they are."""
+        v = _u32(vertices, "vertices").reshape(-1)
+        x = None if targets is None else _f64(targets, 3, "targets")
+        if x is not None and len(x) != len(v):
+            raise ValueError(f"{len(x)} targets for {len(v)} vertices")
+        pointer = None if x is None else _pointer(x)
+        _check(lib.toile_sim_pin(self.handle, _pointer(v), len(v), pointer))
+
+    def unpin(self, vertices: Array) -> None:
+        """Lets vertices go."""
+        v = _u32(vertices, "vertices").reshape(-1)
+        _check(lib.toile_sim_unpin(self.handle, _pointer(v), len(v)))
+
+    def locate(self, panel: int, uv: Array) -> int:
+        """Vertex of a panel nearest to a flat point [m]."""
+        out = ctypes.c_uint32()
+        _check(lib.toile_sim_locate(self.handle, panel, _vector(uv, 2, "uv"), ctypes.byref(out)))
+        return out.value
+
+    def step(self, dt: float) -> Report:
+        """Advances by exactly `dt` [s]."""
+        report = _ffi.new("toile_step_report")
+        _check(lib.toile_sim_step(self.handle, dt, ctypes.byref(report)))
+        return _report(report)
+
+    def drape(
+        self,
+        force_tolerance: float = 0.0,
+        max_steps: int = 0,
+        progress: Optional[ProgressCallback] = None,
+    ) -> Report:
+        """Sews and drapes to rest; 0 takes the library's setting. An exception in `progress`
+        stops the drape and comes out of this call."""
+        desc = _ffi.new("toile_drape_desc")
+        desc.force_tolerance, desc.max_steps = force_tolerance, max_steps
+        raised: list[BaseException] = []
+
+        def call(_user: Any, pointer: int) -> int:
+            state = ctypes.cast(pointer, ctypes.POINTER(_ffi.types["toile_progress"])).contents
+            try:
+                stage = (state.stage or b"").decode()
+                go_on = progress is None or progress(state.fraction, stage, state.residual)
+                return 1 if go_on is False else 0
+            except BaseException as e:
+                raised.append(e)
+                return 1
+
+        callback = _ffi.progress_fn(call)
+        if progress is not None:
+            desc.progress = callback
+        report = _ffi.new("toile_step_report")
+        status = lib.toile_sim_drape(self.handle, ctypes.byref(desc), ctypes.byref(report))
+        if raised:
+            raise raised[0]
+        _check(status)
+        return _report(report)
+
+    def report(self) -> Report:
+        """Numbers of the present state without advancing it."""
+        report = _ffi.new("toile_step_report")
+        _check(lib.toile_sim_report(self.handle, ctypes.byref(report)))
+        return _report(report)
+
+    def _view(self, function: Any) -> np.ndarray:
+        view = _ffi.new("toile_view_f64")
+        _check(function(self.handle, ctypes.byref(view)))
+        if view.count == 0:
+            return np.zeros((0, 3))
+        address = ctypes.cast(view.data, ctypes.c_void_p).value
+        length = (view.count - 1) * view.stride + view.components * 8
+        memory = (ctypes.c_uint8 * length).from_address(address)
+        # the buffer refers to this object: the library's memory lives while a view does
+        memory._owner = self
+        out = np.ndarray(
+            (view.count, view.components), np.float64, memory, strides=(view.stride, 8)
+        )
+        out.flags.writeable = False
+        return out
+
+    @property
+    def positions(self) -> np.ndarray:
+        """Positions [m], shape (vertices, 3): a read-only view without a copy, valid until the
+        next call that changes this simulation. Copy it to keep it."""
+        return self._view(lib.toile_sim_positions_view)
+
+    @property
+    def velocities(self) -> np.ndarray:
+        """Velocities [m/s], shape (vertices, 3); a view like `positions`."""
+        return self._view(lib.toile_sim_velocities_view)
+
+    def set_positions(self, positions: Array, velocities: Optional[Array] = None) -> None:
+        """Sets every position [m] and velocity [m/s], shape (vertices, 3); ``None`` is zero."""
+        x = _f64(positions, 3, "positions")
+        v = None if velocities is None else _f64(velocities, 3, "velocities")
+        if v is not None and len(v) != len(x):
+            raise ValueError(f"{len(v)} velocities for {len(x)} positions")
+        pointer = None if v is None else _pointer(v)
+        _check(lib.toile_sim_set_positions(self.handle, _pointer(x), pointer, len(x)))
+
+    @property
+    def normals(self) -> np.ndarray:
+        """Unit vertex normals, shape (vertices, 3)."""
+        return _copy(lib.toile_sim_normals, np.float64, self.handle).reshape(-1, 3)
+
+    @property
+    def triangles(self) -> np.ndarray:
+        """Vertex triples, shape (triangles, 3)."""
+        return _copy(lib.toile_sim_triangles, np.uint32, self.handle).reshape(-1, 3)
+
+    @property
+    def vertex_panels(self) -> np.ndarray:
+        """Panel of each vertex, shape (vertices,)."""
+        return _copy(lib.toile_sim_vertex_panels, np.uint32, self.handle)
+
+    @property
+    def vertex_uv(self) -> np.ndarray:
+        """Flat coordinates [m], shape (vertices, 2)."""
+        return _copy(lib.toile_sim_vertex_uv, np.float64, self.handle).reshape(-1, 2)
+
+    @property
+    def vertex_active(self) -> np.ndarray:
+        """0 where a vertex follows the yarns above it, shape (vertices,)."""
+        return _copy(lib.toile_sim_vertex_active, np.uint8, self.handle)
+
+    @property
+    def epoch(self) -> int:
+        """Changes with every call that may invalidate a view."""
+        return int(lib.toile_sim_epoch(self.handle))
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return float(lib.toile_sim_time(self.handle))
+
+    @property
+    def energies(self) -> Energies:
+        """Energies of the present state [J]."""
+        value = _ffi.new("toile_energies")
+        _check(lib.toile_sim_energies(self.handle, ctypes.byref(value)))
+        return Energies(**_fields(value))
+
+    @property
+    def info(self) -> SystemInfo:
+        """Counts and bytes of what was built."""
+        value = _ffi.new("toile_system_info")
+        _check(lib.toile_sim_info(self.handle, ctypes.byref(value)))
+        return SystemInfo(**_fields(value))
+
+    @property
+    def backend(self) -> str:
+        """Name of the linear solver."""
+        return _text(lib.toile_sim_backend, self.handle)
+
+    def __getitem__(self, name: str) -> float:
+        """A number by dotted name, such as ``solver.newton.max_iterations``."""
+        out = ctypes.c_double()
+        _check(lib.toile_sim_number(self.handle, _encode(name), ctypes.byref(out)))
+        return out.value
+
+    def __setitem__(self, name: str, value: float) -> None:
+        _check(lib.toile_sim_set_number(self.handle, _encode(name), value))
+
+    def save(self) -> bytes:
+        """The state; restoring it continues bitwise."""
+        return _copy(lib.toile_sim_save, np.uint8, self.handle).tobytes()
+
+    def restore(self, data: bytes) -> None:
+        """Restores a saved state of the same garment and bodies."""
+        buffer = (ctypes.c_uint8 * len(data)).from_buffer_copy(data)
+        _check(lib.toile_sim_restore(self.handle, buffer, len(data)))

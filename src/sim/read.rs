@@ -1,0 +1,141 @@
+//! What there is: arrays of the garment, energies, sizes.
+
+use super::run::kinetic_energy;
+use super::{Energies, Sim};
+use crate::error::Result;
+use crate::math::Vec3;
+use crate::readout::surface;
+use crate::tri::GarmentMesh;
+
+/// Counts and bytes of what was built, as `toile info` prints them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SystemInfo {
+    /// Vertices.
+    pub vertices: usize,
+    /// Triangles.
+    pub triangles: usize,
+    /// Scalar unknowns.
+    pub unknowns: usize,
+    /// Terms: name and stencils.
+    pub terms: Vec<(String, usize)>,
+    /// Bytes of mesh, terms and matrix, without the factor.
+    pub bytes: usize,
+    /// Bytes of the factor and the solver's work arrays.
+    pub factor_bytes: usize,
+    /// Smallest triangle angle [rad].
+    pub min_angle: f64,
+    /// What the triangulation could not do as asked, each with the panel's name.
+    pub notes: Vec<String>,
+    /// Name of the linear solver.
+    pub backend: String,
+}
+
+impl Sim {
+    /// Changes with every call that may invalidate a view.
+    pub fn epoch(&self) -> u64 {
+        self.epoch
+    }
+
+    /// Simulated time [s].
+    pub fn time(&self) -> f64 {
+        self.state.time
+    }
+
+    /// Vertex positions [m].
+    pub fn positions(&self) -> &[Vec3] {
+        &self.state.positions
+    }
+
+    /// Vertex velocities [m/s].
+    pub fn velocities(&self) -> &[Vec3] {
+        &self.state.velocities
+    }
+
+    /// Unit vertex normals, pointing to the outside of the cloth.
+    pub fn normals(&self) -> Vec<Vec3> {
+        surface::normals(&self.state.positions, &self.mesh.triangles)
+    }
+
+    /// Vertex triples.
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.mesh.triangles
+    }
+
+    /// The triangulated garment.
+    pub fn mesh(&self) -> &GarmentMesh {
+        &self.mesh
+    }
+
+    /// Lumped mass of each vertex [kg].
+    pub fn masses(&self) -> &[f64] {
+        &self.masses
+    }
+
+    /// Panel of each vertex.
+    pub fn vertex_panels(&self) -> &[u32] {
+        &self.mesh.vertex_panel
+    }
+
+    /// Flat coordinates of each vertex [m].
+    pub fn vertex_uv(&self) -> &[crate::math::Vec2] {
+        &self.mesh.uv
+    }
+
+    /// Energies of the present state.
+    pub fn energies(&self) -> Result<Energies> {
+        let mut out = Energies {
+            kinetic: kinetic_energy(&self.state, &self.masses),
+            ..Energies::default()
+        };
+        for (name, value) in self.engine().energies(&self.state)? {
+            match name {
+                "gravity" => out.gravity += value,
+                "membrane" => out.membrane += value,
+                "hinge" | "quadratic_bending" => out.bending += value,
+                "seam" | "seam_hinge" => out.seam += value,
+                "body_contact" | "edge_contact" | "self_contact" => out.contact += value,
+                _ => {}
+            }
+        }
+        Ok(out)
+    }
+
+    /// A sentence for each panel that was refined with a lower angle limit than asked for.
+    fn lowered_angles(&self) -> Vec<String> {
+        self.mesh
+            .lowered
+            .iter()
+            .map(|l| {
+                let name = self.garment.panels.get(l.panel as usize);
+                format!(
+                    "panel {} '{}': refinement ended only with an angle limit of {:.0} degrees, {:.0} were asked",
+                    l.panel,
+                    name.map_or("", |p| p.name.as_str()),
+                    l.kept.to_degrees(),
+                    l.asked.to_degrees()
+                )
+            })
+            .collect()
+    }
+
+    /// What was built and what it costs.
+    pub fn info(&self) -> SystemInfo {
+        let engine = self.engine();
+        let system = &engine.system;
+        SystemInfo {
+            vertices: self.mesh.uv.len(),
+            triangles: self.mesh.triangles.len(),
+            unknowns: 3 * (self.mesh.uv.len() - self.state.pins.len()),
+            terms: system
+                .terms
+                .iter()
+                .map(|t| (t.name().to_owned(), t.stencils().count()))
+                .collect(),
+            bytes: engine.matrix_bytes() + system.bytes(),
+            factor_bytes: engine.factor_bytes(),
+            min_angle: self.mesh.min_angle,
+            notes: self.lowered_angles(),
+            backend: engine.backend().to_owned(),
+        }
+    }
+}

@@ -1,0 +1,255 @@
+//! The world around the cloth: bodies and their motion, pins, positions, numbers.
+
+use super::{ContactSettings, Sim, finite, finite_points};
+use crate::body::{Body, Pose};
+use crate::error::{Error, Result};
+use crate::math::{Rotation, Vec3};
+use crate::system::bodies::check_index;
+use crate::system::state::{Pin, State};
+
+impl Sim {
+    /// Puts a body into the world at the identity pose; returns its number.
+    pub fn add_body(&mut self, body: &Body, contact: &ContactSettings) -> Result<u32> {
+        contact.check()?;
+        let entry = self.engine().system.bodies.add(body, contact);
+        self.state.bodies.push(entry);
+        self.bodies.push((body.clone(), *contact));
+        self.epoch += 1;
+        Ok((self.bodies.len() - 1) as u32)
+    }
+
+    /// Number of bodies.
+    pub fn body_count(&self) -> usize {
+        self.bodies.len()
+    }
+
+    /// Display mesh of a body at its present pose and deformation.
+    pub fn body_mesh(&self, body: u32) -> Result<(Vec<Vec3>, Vec<[u32; 3]>)> {
+        let b = check_index(body, self.bodies.len())?;
+        let (mut positions, triangles) = self.bodies[b].0.display_mesh();
+        let state = &self.state.bodies[b];
+        if !state.vertices.is_empty() {
+            positions.clone_from(&state.vertices);
+        }
+        for p in &mut positions {
+            *p = state.pose.to_world(p);
+        }
+        Ok((positions, triangles))
+    }
+
+    /// Where the body is to be at the end of the next step; the cloth feels the velocity that
+    /// follows. Before the first step or drape it is a placement: the body stands there at once and
+    /// has no velocity. A drape takes the body to its pose before it begins.
+    pub fn set_body_pose(&mut self, body: u32, position: [f64; 3], xyzw: [f64; 4]) -> Result<()> {
+        let b = check_index(body, self.bodies.len())?;
+        finite("position", &position)?;
+        finite("quaternion", &xyzw)?;
+        let [x, y, z, w] = xyzw;
+        let quaternion = nalgebra::Quaternion::new(w, x, y, z);
+        let rotation = Rotation::try_new(quaternion, 1e-12).ok_or_else(|| {
+            Error::argument(format!("body {b}: quaternion {xyzw:?} has no length"))
+        })?;
+        let pose = Pose {
+            position: Vec3::from(position),
+            rotation,
+        };
+        let state = &mut self.state.bodies[b];
+        state.target = pose;
+        if !state.moved_with_time {
+            state.pose = pose;
+        }
+        self.epoch += 1;
+        Ok(())
+    }
+
+    /// Vertices of a deforming mesh body at the end of the next step, body frame [m]; like a pose, a
+    /// placement before the first step or drape.
+    pub fn set_body_vertices(&mut self, body: u32, positions: &[[f64; 3]]) -> Result<()> {
+        let b = check_index(body, self.bodies.len())?;
+        let count = self.bodies[b].0.vertices().len();
+        if count == 0 {
+            return Err(Error::unsupported(format!(
+                "body {b} is not a mesh and cannot deform"
+            )));
+        }
+        if positions.len() != count {
+            return Err(Error::argument(format!(
+                "body {b} has {count} vertices, {} were given",
+                positions.len()
+            )));
+        }
+        let vertices: Vec<Vec3> = positions.iter().map(|p| Vec3::from(*p)).collect();
+        finite_points("body vertex", &vertices)?;
+        let state = &mut self.state.bodies[b];
+        if !state.moved_with_time {
+            // a placement: the deformed field must exist before anything is changed
+            self.bodies[b].0.deformed(&vertices)?;
+            state.vertices.clone_from(&vertices);
+            state.target_vertices.clear();
+        } else {
+            state.target_vertices = vertices;
+        }
+        self.epoch += 1;
+        Ok(())
+    }
+
+    /// From here on a pose is a motion, even before the first step.
+    pub fn end_placement(&mut self) {
+        for body in &mut self.state.bodies {
+            body.moved_with_time = true;
+        }
+    }
+
+    /// Force and torque of the cloth on a body, about the body's origin, world axes [N], [N m].
+    pub fn body_wrench(&self, body: u32) -> Result<([f64; 3], [f64; 3])> {
+        let b = check_index(body, self.bodies.len())?;
+        let (force, torque) = self.engine().body_wrench(&self.state, b)?;
+        Ok((force.into(), torque.into()))
+    }
+
+    /// Holds vertices; targets are reached at the end of the next step, `None` holds them where
+    /// they are. A vertex that is already pinned takes the new target.
+    pub fn pin(&mut self, vertices: &[u32], targets: Option<&[[f64; 3]]>) -> Result<()> {
+        self.check_vertices(vertices)?;
+        if let Some(targets) = targets {
+            if targets.len() != vertices.len() {
+                return Err(Error::argument(format!(
+                    "{} vertices but {} targets",
+                    vertices.len(),
+                    targets.len()
+                )));
+            }
+            for (v, t) in vertices.iter().zip(targets) {
+                finite(&format!("target of vertex {v}"), t)?;
+            }
+        }
+        for (k, &vertex) in vertices.iter().enumerate() {
+            let target = targets.map_or(self.state.positions[vertex as usize], |targets| {
+                Vec3::from(targets[k])
+            });
+            match self.state.pins.binary_search_by_key(&vertex, |p| p.vertex) {
+                Ok(i) => self.state.pins[i].target = target,
+                Err(i) => self.state.pins.insert(i, Pin { vertex, target }),
+            }
+        }
+        self.epoch += 1;
+        Ok(())
+    }
+
+    /// Lets vertices go; one that is not pinned is refused.
+    pub fn unpin(&mut self, vertices: &[u32]) -> Result<()> {
+        self.check_vertices(vertices)?;
+        let pinned = |v: &u32| {
+            self.state
+                .pins
+                .binary_search_by_key(v, |p| p.vertex)
+                .is_ok()
+        };
+        if let Some(v) = vertices.iter().find(|v| !pinned(v)) {
+            return Err(Error::argument(format!("vertex {v} is not pinned")));
+        }
+        self.state.pins.retain(|p| !vertices.contains(&p.vertex));
+        self.epoch += 1;
+        Ok(())
+    }
+
+    fn check_vertices(&self, vertices: &[u32]) -> Result<()> {
+        let n = self.state.positions.len();
+        match vertices.iter().find(|&&v| v as usize >= n) {
+            Some(v) => Err(Error::argument(format!(
+                "vertex {v} does not exist; there are {n} vertices"
+            ))),
+            None => Ok(()),
+        }
+    }
+
+    /// Vertex of a panel nearest to a flat point [m].
+    pub fn locate(&self, panel: u32, uv: [f64; 2]) -> Result<u32> {
+        finite("uv", &uv)?;
+        let starts = &self.mesh.panel_starts;
+        let p = panel as usize;
+        if p + 1 >= starts.len() {
+            return Err(Error::argument(format!(
+                "panel {panel} does not exist; there are {}",
+                starts.len().saturating_sub(1)
+            )));
+        }
+        let point = crate::math::Vec2::from(uv);
+        (starts[p]..starts[p + 1])
+            .min_by(|a, b| {
+                let d = |v: &u32| (self.mesh.uv[*v as usize] - point).norm_squared();
+                d(a).total_cmp(&d(b))
+            })
+            .ok_or_else(|| Error::argument(format!("panel {panel} has no vertices")))
+    }
+
+    /// Sets positions [m] and velocities [m/s] of every vertex (`None`: zero). Friction anchors are
+    /// forgotten; pins keep their targets.
+    pub fn set_positions(&mut self, x: &[[f64; 3]], v: Option<&[[f64; 3]]>) -> Result<()> {
+        let n = self.state.positions.len();
+        if x.len() != n || v.is_some_and(|v| v.len() != n) {
+            return Err(Error::argument(format!(
+                "{n} vertices, not {}, are expected",
+                x.len()
+            )));
+        }
+        let x: Vec<Vec3> = x.iter().map(|p| Vec3::from(*p)).collect();
+        let v: Vec<Vec3> = v.map_or_else(
+            || vec![Vec3::zeros(); n],
+            |v| v.iter().map(|p| Vec3::from(*p)).collect(),
+        );
+        finite_points("position of vertex", &x)?;
+        finite_points("velocity of vertex", &v)?;
+        self.state.positions = x;
+        self.state.velocities = v;
+        self.state.body_anchors.clear();
+        self.state.pair_anchors.clear();
+        self.state.step_size = f64::MAX;
+        self.epoch += 1;
+        Ok(())
+    }
+
+    /// Sets a tunable, gravity (`gravity.x`), wind (`wind.x`) or `pressure` by dotted name.
+    pub fn set_number(&mut self, name: &str, value: f64) -> Result<()> {
+        finite(name, &[value])?;
+        if let Some(slot) = world_number(&mut self.state, name) {
+            *slot = value;
+        } else {
+            let mut settings = self.settings.clone();
+            settings.set(name, value)?;
+            self.engine().set_settings(&settings)?;
+            self.settings = settings;
+        }
+        self.epoch += 1;
+        Ok(())
+    }
+
+    /// Reads what `set_number` sets.
+    pub fn number(&self, name: &str) -> Result<f64> {
+        let s = &self.state;
+        let value = match name {
+            "gravity.x" => Some(s.gravity.x),
+            "gravity.y" => Some(s.gravity.y),
+            "gravity.z" => Some(s.gravity.z),
+            "wind.x" => Some(s.wind.x),
+            "wind.y" => Some(s.wind.y),
+            "wind.z" => Some(s.wind.z),
+            "pressure" => Some(s.pressure),
+            _ => self.settings.get(name),
+        };
+        value.ok_or_else(|| Error::argument(format!("'{name}' is not the name of a number")))
+    }
+}
+
+fn world_number<'a>(state: &'a mut State, name: &str) -> Option<&'a mut f64> {
+    match name {
+        "gravity.x" => Some(&mut state.gravity.x),
+        "gravity.y" => Some(&mut state.gravity.y),
+        "gravity.z" => Some(&mut state.gravity.z),
+        "wind.x" => Some(&mut state.wind.x),
+        "wind.y" => Some(&mut state.wind.y),
+        "wind.z" => Some(&mut state.wind.z),
+        "pressure" => Some(&mut state.pressure),
+        _ => None,
+    }
+}
