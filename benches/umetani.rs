@@ -1,6 +1,7 @@
 //! Convergence from random positions (Umetani et al. 2011, Fig. 6): a square textile of 3,042
 //! triangles hung at its two upper corners, and a plate of 2,048 triangles that is 100 times stiffer
-//! in bending, start with every vertex anywhere in a cube of the sheet's size.
+//! in bending (the isometric model, as in the paper), start with every vertex anywhere in a cube of
+//! the sheet's size.
 //!
 //! Prints, for ten seeds, after how many Newton iterations the potential energy (zero at the height
 //! of the pins) is within 1 % of that of the sheet draped from its plane. The energy is looked at
