@@ -191,7 +191,12 @@ impl Engine {
                 Motion::Dynamic => self.settings.newton_max_iterations as u32,
                 Motion::Relax { .. } => 1,
             },
-            linear: self.settings.linear_tolerance,
+            // a relaxation takes one correction for each matrix: a rough one will do
+            linear: if dynamic {
+                self.settings.linear_tolerance
+            } else {
+                (10.0 * self.settings.linear_tolerance).min(0.1)
+            },
             exactness: f64::from(u8::from(matches!(
                 motion,
                 Motion::Relax { exact: true, .. }

@@ -17,7 +17,7 @@
 use crate::math::{Mat3, Vec3};
 
 /// Offset at which sticking turns into slipping [m].
-pub(super) const REACH: f64 = 2e-6;
+pub(super) const REACH: f64 = 5e-6;
 
 /// Friction of one contact within a step.
 #[derive(Clone, Copy, Debug)]
