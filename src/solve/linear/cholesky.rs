@@ -28,7 +28,7 @@ use faer::sparse::linalg::cholesky::{
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRef};
 use faer::traits::RealField;
 use faer::{Par, Side};
-use std::ops::{Add, Div, Mul, Sub};
+use std::ops::{Add, AddAssign, Div, Mul, Sub, SubAssign};
 
 /// A precision to factor in.
 pub(super) trait Number:
@@ -40,6 +40,8 @@ pub(super) trait Number:
     + Sub<Output = Self>
     + Mul<Output = Self>
     + Div<Output = Self>
+    + AddAssign
+    + SubAssign
 {
     /// Distance from 1 to the next number.
     const EPSILON: f64;
@@ -265,14 +267,14 @@ impl<T: Number> Cholesky<T> {
                 let value = x[begin + j] / column[j];
                 x[begin + j] = value;
                 for (x, l) in x[begin + j + 1..].iter_mut().zip(&column[j + 1..width]) {
-                    *x = *x - *l * value;
+                    *x -= *l * value;
                 }
                 for (b, l) in below.iter_mut().zip(&column[width..]) {
-                    *b = *b + *l * value;
+                    *b += *l * value;
                 }
             }
             for (b, row) in below.iter().zip(rows) {
-                x[*row] = x[*row] - *b;
+                x[*row] -= *b;
             }
         }
         for s in (0..symbolic.n_supernodes()).rev() {
@@ -328,15 +330,15 @@ fn dot<T: Number>(a: &[T], b: &[T]) -> T {
     let (whole_b, rest_b) = b.as_chunks::<STRANDS>();
     for (a, b) in whole_a.iter().zip(whole_b) {
         for k in 0..STRANDS {
-            sums[k] = sums[k] + a[k] * b[k];
+            sums[k] += a[k] * b[k];
         }
     }
     let mut sum = T::of(0.0);
     for k in 0..STRANDS / 2 {
-        sum = sum + (sums[k] + sums[k + STRANDS / 2]);
+        sum += sums[k] + sums[k + STRANDS / 2];
     }
     for (a, b) in rest_a.iter().zip(rest_b) {
-        sum = sum + *a * *b;
+        sum += *a * *b;
     }
     sum
 }
