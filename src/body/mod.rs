@@ -6,16 +6,18 @@
 //! `spline` for why it is not the trilinear interpolant, and for its error).
 
 mod analytic;
-mod bvh;
 mod deform;
 mod field;
 mod grid;
 pub mod mannequin;
 mod mesh;
+mod nearby;
 mod obj;
 mod sign;
 mod spline;
 mod surface_nets;
+mod tree;
+mod triangle;
 
 pub use mesh::MeshReport;
 

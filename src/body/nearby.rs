@@ -1,0 +1,190 @@
+//! Exact distances at the nodes of a brick, the search shared by all of them.
+//!
+//! A triangle nearest to any point of a ball (centre `c`, radius `r`) is at most `d(c) + 2 r` away
+//! from `c`, where `d(c)` is the distance of the mesh. The groups of the tree within that reach are
+//! listed for the brick, from its list those for each block of 2 x 2 x 2 nodes, and only these are
+//! held against the nodes. Each node begins with the triangle that was nearest to the one before,
+//! so that the first number found is nearly the smallest.
+
+use super::tree::{Discs, Probe, Tree, WIDE, mask};
+use crate::math::Vec3;
+
+/// A list of fewer groups than this is split into theirs.
+const SPLIT: usize = 32;
+
+/// Groups of one level of the tree, eight to a block.
+#[derive(Default)]
+struct List {
+    level: usize,
+    blocks: Vec<Discs>,
+    groups: Vec<u32>,
+}
+
+impl List {
+    fn clear(&mut self, level: usize) {
+        self.level = level;
+        self.blocks.clear();
+        self.groups.clear();
+    }
+
+    /// Adds the groups of a block whose bits are set; its first is number `first`.
+    #[inline]
+    fn add(&mut self, discs: &Discs, mut bits: u32, group: impl Fn(usize) -> Option<u32>) {
+        while bits != 0 {
+            let lane = bits.trailing_zeros() as usize;
+            bits &= bits - 1;
+            let Some(number) = group(lane) else { continue };
+            let to = self.groups.len() % WIDE;
+            if to == 0 {
+                self.blocks.push(Discs::NONE);
+            }
+            if let Some(last) = self.blocks.last_mut() {
+                last.set(to, discs, lane);
+            }
+            self.groups.push(number);
+        }
+    }
+
+    /// What of another list is within reach.
+    fn cull(&mut self, from: &Self, probe: &Probe, reach2: f32) {
+        self.clear(from.level);
+        for (b, discs) in from.blocks.iter().enumerate() {
+            let bits = discs.within(&probe.local, reach2);
+            self.add(discs, bits, |lane| {
+                from.groups.get(b * WIDE + lane).copied()
+            });
+        }
+    }
+
+    /// What of the groups of another list is within reach.
+    fn split(&mut self, from: &Self, tree: &Tree, probe: &Probe, reach2: f32) {
+        self.clear(from.level - 1);
+        let count = tree.count(from.level - 1) as u32;
+        for &group in &from.groups {
+            let discs = tree.children(from.level, group as usize);
+            let bits = discs.within(&probe.local, reach2);
+            let first = group * WIDE as u32;
+            self.add(discs, bits, |lane| {
+                Some(first + lane as u32).filter(|&g| g < count)
+            });
+        }
+    }
+
+    /// Smallest distance to the listed groups; `place` as the hint of [`Tree::distance`].
+    #[inline]
+    fn distance(&self, tree: &Tree, p: &Vec3, place: &mut usize) -> f64 {
+        let probe = tree.probe(p);
+        let mut best = tree.distance2(*place, p);
+        let mut reach2 = probe.reach2(best.sqrt());
+        for (b, discs) in self.blocks.iter().enumerate() {
+            let bounds = discs.bounds(&probe.local);
+            let mut bits = mask(&bounds, reach2);
+            while bits != 0 {
+                let lane = bits.trailing_zeros() as usize;
+                bits &= bits - 1;
+                if bounds[lane] > reach2 {
+                    continue;
+                }
+                let Some(&group) = self.groups.get(b * WIDE + lane) else {
+                    continue;
+                };
+                if self.level == 0 {
+                    let d2 = tree.distance2(group as usize, p);
+                    if d2 < best {
+                        best = d2;
+                        *place = group as usize;
+                    }
+                } else {
+                    tree.improve(&probe, self.level, group as usize, &mut best, place);
+                }
+                reach2 = probe.reach2(best.sqrt());
+            }
+        }
+        best.sqrt()
+    }
+}
+
+/// Distances at bricks of one tree; works fastest on bricks that follow each other in space.
+pub(super) struct Sampler<'a> {
+    tree: &'a Tree,
+    hint: usize,
+    brick: List,
+    block: List,
+    spare: List,
+}
+
+impl<'a> Sampler<'a> {
+    pub(super) fn new(tree: &'a Tree) -> Self {
+        Self {
+            tree,
+            hint: 0,
+            brick: List::default(),
+            block: List::default(),
+            spare: List::default(),
+        }
+    }
+
+    /// Smallest distance to `p`, if it is not above `limit`.
+    pub(super) fn distance(&mut self, p: &Vec3, limit: f64) -> Option<f64> {
+        // nothing beyond the limit is looked for; the slack keeps the comparison itself exact
+        let bar = limit * limit * (1.0 + 1e-12);
+        let mut best = self.tree.distance2(self.hint, p).min(bar);
+        let probe = self.tree.probe(p);
+        let (depth, place) = (self.tree.depth(), &mut self.hint);
+        self.tree.improve(&probe, depth, 0, &mut best, place);
+        let d = best.sqrt();
+        (best < bar && d <= limit).then_some(d)
+    }
+
+    /// Distances at the 64 nodes `center + h (i - 3/2, j - 3/2, k - 3/2)`; `distance` is that of the
+    /// centre, `node(n)` the place of node `n = (4 i + j) 4 + k`.
+    pub(super) fn brick(
+        &mut self,
+        center: &Vec3,
+        distance: f64,
+        h: f64,
+        node: impl Fn(usize) -> Vec3,
+    ) -> [f64; 64] {
+        let tree = self.tree;
+        // half diagonals of the nodes: 1.5 sqrt(3) and 0.5 sqrt(3) spacings, rounded up
+        let (whole, part) = (2.5981 * h, 0.8661 * h);
+        let probe = tree.probe(center);
+        let reach2 = probe.reach2(distance + 2.0 * whole);
+        self.brick.clear(tree.depth() - 1);
+        let top = tree.top();
+        let count = tree.count(tree.depth() - 1);
+        self.brick
+            .add(top, top.within(&probe.local, reach2), |lane| {
+                Some(lane as u32).filter(|&g| (g as usize) < count)
+            });
+        narrow(&mut self.brick, &mut self.spare, tree, &probe, reach2);
+        let mut out = [0.0; 64];
+        for step in 0..8usize {
+            // neighbours follow each other (Gray code)
+            let s = step ^ (step >> 1);
+            let corner = [s >> 2 & 1, s >> 1 & 1, s & 1];
+            let c = center + Vec3::from_fn(|d, _| (2.0 * corner[d] as f64 - 1.0) * h);
+            let near = self.brick.distance(tree, &c, &mut self.hint);
+            let probe = tree.probe(&c);
+            let reach2 = probe.reach2(near + 2.0 * part);
+            self.block.cull(&self.brick, &probe, reach2);
+            narrow(&mut self.block, &mut self.spare, tree, &probe, reach2);
+            for step in 0..8usize {
+                let s = step ^ (step >> 1);
+                let i = [s >> 2 & 1, s >> 1 & 1, s & 1];
+                let n =
+                    16 * (2 * corner[0] + i[0]) + 4 * (2 * corner[1] + i[1]) + 2 * corner[2] + i[2];
+                out[n] = self.block.distance(tree, &node(n), &mut self.hint);
+            }
+        }
+        out
+    }
+}
+
+/// Splits the groups of a short list.
+fn narrow(list: &mut List, spare: &mut List, tree: &Tree, probe: &Probe, reach2: f32) {
+    while list.level > 0 && list.groups.len() < SPLIT {
+        spare.split(list, tree, probe, reach2);
+        std::mem::swap(list, spare);
+    }
+}

@@ -1,0 +1,522 @@
+//! Tree over the triangles of a mesh: nearest triangle, moved triangles near a point, segment
+//! crossings.
+//!
+//! Triangles stand in an order in which every 8 that follow each other, every 64, every 512 and so
+//! on lie close together (halves along the longest axis, cut at multiples of the powers of 8), so
+//! that the tree needs no links: group `g` of a level has the groups `8 g ..= 8 g + 7` of the level
+//! below, down to single triangles. Every group is bounded by a thick disc: centre `c`, unit normal
+//! `n`, radius `R` and half thickness `t`. A point at `e` from the centre, with height `z = n . e`
+//! and `rho = |e - z n|` off the axis, is at least
+//!
+//! ```text
+//! sqrt( max(0, |z| - t)^2 + max(0, rho - R)^2 )
+//! ```
+//!
+//! away from all of it. A patch of a smooth surface is nearly flat and a box around it is not, which
+//! is why discs reject far more than boxes do. The bounds of eight groups are computed at once in
+//! f32 about the mesh's middle; `Tree::reach` widens what they are compared with beyond all rounding.
+//!
+//! Queries return the same bits whatever the order of the triangles: a group is left out only if it
+//! is farther than the best found, so that the answer is the minimum over all triangles of an f64
+//! number computed from that triangle alone. Where a bound is not a number, the group is looked at.
+
+use super::triangle::Tri;
+use crate::math::Vec3;
+use crate::math::parallel::Workers;
+
+/// Groups in a group.
+pub(super) const WIDE: usize = 8;
+
+/// Part of the mesh's size and of the distance from its middle that f32 bounds may be wrong by:
+/// centres, normals and the point are rounded to 6e-8, and some ten operations follow.
+const ROUNDING: f64 = 4e-6;
+
+/// Eight thick discs.
+#[derive(Clone, Debug)]
+pub(super) struct Discs {
+    center: [[f32; WIDE]; 3],
+    normal: [[f32; WIDE]; 3],
+    radius: [f32; WIDE],
+    height: [f32; WIDE],
+}
+
+impl Discs {
+    /// Places for discs, all so far away that nothing finds them.
+    pub(super) const NONE: Self = Self {
+        center: [[1e15; WIDE]; 3],
+        normal: [[0.0; WIDE]; 3],
+        radius: [0.0; WIDE],
+        height: [0.0; WIDE],
+    };
+
+    /// Copies one disc.
+    #[inline]
+    pub(super) fn set(&mut self, to: usize, other: &Self, from: usize) {
+        for d in 0..3 {
+            self.center[d][to] = other.center[d][from];
+            self.normal[d][to] = other.normal[d][from];
+        }
+        self.radius[to] = other.radius[from];
+        self.height[to] = other.height[from];
+    }
+
+    /// Squared lower bounds of the distances to `p`.
+    #[inline]
+    pub(super) fn bounds(&self, p: &[f32; 3]) -> [f32; WIDE] {
+        // `f32::max` would also sort out what is not a number, which costs vector width
+        let positive = |x: f32| if x > 0.0 { x } else { 0.0 };
+        std::array::from_fn(|i| {
+            let e = [0, 1, 2].map(|d| p[d] - self.center[d][i]);
+            let n = [0, 1, 2].map(|d| self.normal[d][i]);
+            let z = e[0] * n[0] + e[1] * n[1] + e[2] * n[2];
+            let s = [0, 1, 2].map(|d| e[d] - z * n[d]);
+            let rho = (s[0] * s[0] + s[1] * s[1] + s[2] * s[2]).sqrt();
+            let up = positive(z.abs() - self.height[i]);
+            let off = positive(rho - self.radius[i]);
+            up * up + off * off
+        })
+    }
+
+    /// Bits of the discs whose bound does not exceed a squared reach.
+    #[inline]
+    pub(super) fn within(&self, p: &[f32; 3], reach2: f32) -> u32 {
+        mask(&self.bounds(p), reach2)
+    }
+}
+
+#[inline]
+pub(super) fn mask(bounds: &[f32; WIDE], reach2: f32) -> u32 {
+    let mut bits = 0;
+    for (i, &b) in bounds.iter().enumerate() {
+        bits |= u32::from(!(b > reach2)) << i;
+    }
+    bits
+}
+
+/// Which triangles have moved: per level of the tree and block of eight groups one bit per group.
+#[derive(Debug)]
+pub(super) struct Moved {
+    levels: Vec<Vec<u8>>,
+    count: usize,
+}
+
+impl Moved {
+    /// Number of moved triangles.
+    pub(super) fn count(&self) -> usize {
+        self.count
+    }
+}
+
+/// A point as the bounds want it.
+#[derive(Clone, Copy)]
+pub(super) struct Probe {
+    pub(super) p: Vec3,
+    pub(super) local: [f32; 3],
+    margin: f64,
+}
+
+impl Probe {
+    /// What squared bounds are compared with to find everything within a distance.
+    #[inline]
+    pub(super) fn reach2(&self, distance: f64) -> f32 {
+        let r = ((distance + self.margin) * (1.0 + ROUNDING)) as f32;
+        // above what squares lose by underflow
+        r * r + f32::MIN_POSITIVE
+    }
+}
+
+/// Tree over the triangles of one mesh.
+#[derive(Clone, Debug)]
+pub(super) struct Tree {
+    tris: Vec<Tri>,
+    /// Discs of the triangles, of groups of 8, of 64 and so on; the last level is one block.
+    levels: Vec<Vec<Discs>>,
+    lo: Vec3,
+    hi: Vec3,
+    middle: Vec3,
+    size: f64,
+}
+
+impl Tree {
+    /// Tree over at least one triangle.
+    pub(super) fn new(positions: &[Vec3], triangles: &[[u32; 3]], workers: &Workers) -> Self {
+        let mut order: Vec<(Vec3, u32)> = triangles
+            .iter()
+            .zip(0..)
+            .map(|(t, id)| {
+                let [a, b, c] = t.map(|v| positions[v as usize]);
+                ((a + b + c) / 3.0, id)
+            })
+            .collect();
+        arrange(&mut order);
+        let tris = order
+            .iter()
+            .map(|&(_, id)| Tri::new(id, triangles[id as usize].map(|v| positions[v as usize])))
+            .collect();
+        let mut levels = Vec::new();
+        let mut groups = triangles.len();
+        loop {
+            groups = groups.div_ceil(WIDE);
+            levels.push(vec![Discs::NONE; groups]);
+            if groups == 1 {
+                break;
+            }
+        }
+        let mut tree = Self {
+            tris,
+            levels,
+            lo: Vec3::zeros(),
+            hi: Vec3::zeros(),
+            middle: Vec3::zeros(),
+            size: 0.0,
+        };
+        tree.measure();
+        tree.fit(None, workers);
+        tree
+    }
+
+    /// Which triangles of the tree's mesh are moved by going from `before` to `after`.
+    pub(super) fn moved(&self, triangles: &[[u32; 3]], before: &[Vec3], after: &[Vec3]) -> Moved {
+        let mut count = 0;
+        let mut levels: Vec<Vec<u8>> = self.levels.iter().map(|l| vec![0; l.len()]).collect();
+        for (i, tri) in self.tris.iter().enumerate() {
+            let t = triangles[tri.id as usize].map(|v| v as usize);
+            if t.iter().any(|&v| before[v] != after[v]) {
+                levels[0][i / WIDE] |= 1 << (i % WIDE);
+                count += 1;
+            }
+        }
+        for l in 1..levels.len() {
+            let (below, here) = levels.split_at_mut(l);
+            for (i, _) in below[l - 1].iter().enumerate().filter(|b| *b.1 != 0) {
+                here[0][i / WIDE] |= 1 << (i % WIDE);
+            }
+        }
+        Moved { levels, count }
+    }
+
+    /// The same tree on other positions of the same mesh, of which only `moved` differ.
+    pub(super) fn refitted(
+        &self,
+        positions: &[Vec3],
+        triangles: &[[u32; 3]],
+        moved: &Moved,
+        workers: &Workers,
+    ) -> Self {
+        let mut tree = self.clone();
+        for (i, tri) in tree.tris.iter_mut().enumerate() {
+            if moved.levels[0][i / WIDE] >> (i % WIDE) & 1 == 1 {
+                let corners = triangles[tri.id as usize].map(|v| positions[v as usize]);
+                *tri = Tri::new(tri.id, corners);
+            }
+        }
+        tree.measure();
+        // discs stand in a frame about the middle; unless it is kept, all have moved
+        let same = tree.middle == self.middle && tree.size.to_bits() == self.size.to_bits();
+        tree.fit(Some(moved).filter(|_| same), workers);
+        tree
+    }
+
+    /// Box and frame.
+    fn measure(&mut self) {
+        let first = self.tris[0].a;
+        let (lo, hi) = self.tris.iter().fold((first, first), |(lo, hi), t| {
+            let (b, c) = (t.a + t.ab, t.a + t.ac);
+            (lo.inf(&t.a).inf(&b).inf(&c), hi.sup(&t.a).sup(&b).sup(&c))
+        });
+        (self.lo, self.hi) = (lo, hi);
+        self.middle = (lo + hi) * 0.5;
+        self.size = (hi - lo).norm();
+    }
+
+    /// Bounds the groups anew, all or those with moved triangles.
+    fn fit(&mut self, moved: Option<&Moved>, workers: &Workers) {
+        let (tris, middle) = (&self.tris, self.middle);
+        let mut span = 1;
+        for (l, blocks) in self.levels.iter_mut().enumerate() {
+            let chunk = (512 / span).max(1);
+            workers.chunks(blocks, chunk, |number, part| {
+                for (i, discs) in part.iter_mut().enumerate() {
+                    let block = number * chunk + i;
+                    let bits = moved.map_or(u8::MAX, |m| m.levels[l][block]);
+                    for lane in 0..WIDE {
+                        let start = (block * WIDE + lane) * span;
+                        if bits >> lane & 1 == 1 && start < tris.len() {
+                            let group = &tris[start..(start + span).min(tris.len())];
+                            bound(group, &middle, discs, lane);
+                        }
+                    }
+                }
+            });
+            span *= WIDE;
+        }
+    }
+
+    /// Box of the whole mesh.
+    pub(super) fn bounds(&self) -> (Vec3, Vec3) {
+        (self.lo, self.hi)
+    }
+
+    /// Levels of groups; level 0 is the triangles.
+    pub(super) fn depth(&self) -> usize {
+        self.levels.len()
+    }
+
+    /// Number of groups of a level.
+    pub(super) fn count(&self, level: usize) -> usize {
+        self.tris.len().div_ceil(WIDE.pow(level as u32))
+    }
+
+    /// The discs of the top level.
+    pub(super) fn top(&self) -> &Discs {
+        &self.levels[self.levels.len() - 1][0]
+    }
+
+    /// The groups of which group `group` of `level` consists.
+    #[inline]
+    pub(super) fn children(&self, level: usize, group: usize) -> &Discs {
+        &self.levels[level - 1][group]
+    }
+
+    #[inline]
+    pub(super) fn probe(&self, p: &Vec3) -> Probe {
+        let e = p - self.middle;
+        Probe {
+            p: *p,
+            local: [e.x as f32, e.y as f32, e.z as f32],
+            margin: ROUNDING * (self.size + e.norm()),
+        }
+    }
+
+    /// Squared distance of a triangle, by its place in the tree's order.
+    #[inline]
+    pub(super) fn distance2(&self, place: usize, p: &Vec3) -> f64 {
+        self.tris[place].distance2(p)
+    }
+
+    /// Smallest distance to `p`. `hint` is any place in the tree's order, best that of a triangle
+    /// near `p`; it becomes the place of the nearest one. The result does not depend on it.
+    pub(super) fn distance(&self, p: &Vec3, hint: &mut usize) -> f64 {
+        let probe = self.probe(p);
+        let mut best = self.distance2(*hint, p);
+        self.improve(&probe, self.depth(), 0, &mut best, hint);
+        best.sqrt()
+    }
+
+    /// Lowers a squared distance by what lies in one group.
+    #[inline]
+    pub(super) fn improve(
+        &self,
+        probe: &Probe,
+        level: usize,
+        group: usize,
+        best: &mut f64,
+        place: &mut usize,
+    ) {
+        let reach2 = probe.reach2(best.sqrt());
+        self.visit(probe, (level, group), reach2, |i, tri| {
+            let d2 = tri.distance2(&probe.p);
+            if d2 < *best {
+                *best = d2;
+                *place = i;
+            }
+            probe.reach2(best.sqrt())
+        });
+    }
+
+    /// Nearest triangle (the lowest number among equals) and its barycentric weights.
+    pub(super) fn nearest(&self, p: &Vec3) -> (u32, [f64; 3]) {
+        let probe = self.probe(p);
+        let mut best = (f64::INFINITY, self.tris[0].id, (0.0, 0.0));
+        self.visit(&probe, (self.depth(), 0), f32::INFINITY, |_, t| {
+            let (v, w) = t.closest(p);
+            let d2 = (p - t.a - t.ab * v - t.ac * w).norm_squared();
+            if d2 < best.0 || (d2 == best.0 && t.id < best.1) {
+                best = (d2, t.id, (v, w));
+            }
+            probe.reach2(best.0.sqrt())
+        });
+        let (v, w) = best.2;
+        (best.1, [1.0 - v - w, v, w])
+    }
+
+    /// Calls `f` for triangles of a group whose bounds do not exceed the squared reach, which `f`
+    /// returns anew, near ones first.
+    #[inline]
+    fn visit(
+        &self,
+        probe: &Probe,
+        (level, group): (usize, usize),
+        mut reach2: f32,
+        mut f: impl FnMut(usize, &Tri) -> f32,
+    ) {
+        // at most 7 groups wait on each of at most 11 levels
+        let mut stack = [(0.0f32, 0u32, 0u32); 96];
+        let mut top = 1;
+        stack[0] = (0.0, level as u32, group as u32);
+        while top > 0 {
+            top -= 1;
+            let (bound, level, group) = stack[top];
+            if bound > reach2 {
+                continue;
+            }
+            let bounds = self
+                .children(level as usize, group as usize)
+                .bounds(&probe.local);
+            let mut bits = mask(&bounds, reach2);
+            if level == 1 {
+                while bits != 0 {
+                    let lane = bits.trailing_zeros() as usize;
+                    bits &= bits - 1;
+                    let place = group as usize * WIDE + lane;
+                    if !(bounds[lane] > reach2) && place < self.tris.len() {
+                        reach2 = f(place, &self.tris[place]);
+                    }
+                }
+                continue;
+            }
+            // the nearest on top
+            let floor = top;
+            while bits != 0 {
+                let lane = bits.trailing_zeros();
+                bits &= bits - 1;
+                let child = (bounds[lane as usize], level - 1, group * WIDE as u32 + lane);
+                if child.2 as usize >= self.levels[child.1 as usize - 1].len() {
+                    continue;
+                }
+                let mut at = top;
+                while at > floor && stack[at - 1].0 < child.0 {
+                    stack[at] = stack[at - 1];
+                    at -= 1;
+                }
+                stack[at] = child;
+                top += 1;
+            }
+        }
+    }
+
+    /// Whether a moved triangle may lie within `reach` of `p`; never a wrong no.
+    pub(super) fn moved_within(&self, p: &Vec3, reach: f64, moved: &Moved) -> bool {
+        let probe = self.probe(p);
+        let reach2 = probe.reach2(reach);
+        let mut stack = [(0u32, 0u32); 96];
+        let mut top = 1;
+        stack[0] = (self.depth() as u32, 0);
+        while top > 0 {
+            top -= 1;
+            let (level, group) = stack[top];
+            let below = level as usize - 1;
+            let flags = moved.levels[below][group as usize];
+            if flags == 0 {
+                continue;
+            }
+            let near = self.levels[below][group as usize].within(&probe.local, reach2);
+            let mut bits = near & u32::from(flags);
+            if below == 0 && bits != 0 {
+                return true;
+            }
+            while bits != 0 {
+                let lane = bits.trailing_zeros();
+                bits &= bits - 1;
+                stack[top] = (below as u32, group * WIDE as u32 + lane);
+                top += 1;
+            }
+        }
+        false
+    }
+
+    /// Whether the segment meets a triangle.
+    pub(super) fn segment_hits(&self, p: &Vec3, q: &Vec3) -> bool {
+        let (from, to) = (p - self.middle, q - self.middle);
+        let d = to - from;
+        let l2 = d.norm_squared();
+        let margin = ROUNDING * (self.size + from.norm() + to.norm());
+        let mut stack = vec![(self.depth(), 0usize)];
+        while let Some((level, group)) = stack.pop() {
+            let discs = self.children(level, group);
+            for lane in 0..WIDE {
+                let child = group * WIDE + lane;
+                // the ball around the disc
+                let c = Vec3::from_fn(|k, _| f64::from(discs.center[k][lane]));
+                let t = if l2 > 0.0 {
+                    ((c - from).dot(&d) / l2).clamp(0.0, 1.0)
+                } else {
+                    0.0
+                };
+                let ball = f64::from(discs.radius[lane]).hypot(f64::from(discs.height[lane]));
+                if (from + d * t - c).norm() > ball + margin {
+                    continue;
+                }
+                if level > 1 {
+                    if child < self.levels[level - 2].len() {
+                        stack.push((level - 1, child));
+                    }
+                } else if self.tris.get(child).is_some_and(|tri| tri.crosses(p, q)) {
+                    return true;
+                }
+            }
+        }
+        false
+    }
+}
+
+/// Puts triangles in the tree's order: halves along the longest axis of their centres, the first
+/// half a multiple of the largest power of 8 below the count.
+fn arrange(order: &mut [(Vec3, u32)]) {
+    let mut work = vec![(0, order.len())];
+    while let Some((start, end)) = work.pop() {
+        let count = end - start;
+        if count <= 2 {
+            continue;
+        }
+        let part = &mut order[start..end];
+        let first = part[0].0;
+        let (lo, hi) = part
+            .iter()
+            .fold((first, first), |b, p| (b.0.inf(&p.0), b.1.sup(&p.0)));
+        let axis = (hi - lo).imax();
+        let mut unit = 1;
+        while unit * WIDE < count {
+            unit *= WIDE;
+        }
+        let half = (count / 2).next_multiple_of(unit);
+        let half = if half < count { half } else { half - unit };
+        if half == 0 {
+            continue;
+        }
+        part.select_nth_unstable_by(half, |s, t| {
+            s.0[axis].total_cmp(&t.0[axis]).then(s.1.cmp(&t.1))
+        });
+        work.push((start, start + half));
+        work.push((start + half, end));
+    }
+}
+
+/// Thick disc around triangles, about `middle`: centre at the mean of theirs and in the middle of
+/// their heights, normal along their areas' sum.
+fn bound(tris: &[Tri], middle: &Vec3, discs: &mut Discs, lane: usize) {
+    let (mut center, mut normal) = (Vec3::zeros(), Vec3::zeros());
+    for t in tris {
+        center += t.a + (t.ab + t.ac) / 3.0;
+        normal += t.ab.cross(&t.ac);
+    }
+    center /= tris.len() as f64;
+    let normal = normal.try_normalize(f64::MIN_POSITIVE).unwrap_or_default();
+    let (mut lo, mut hi, mut r2) = (f64::INFINITY, f64::NEG_INFINITY, 0.0f64);
+    for t in tris {
+        let e = t.a - center;
+        for e in [e, e + t.ab, e + t.ac] {
+            let z = normal.dot(&e);
+            lo = lo.min(z);
+            hi = hi.max(z);
+            r2 = r2.max((e - normal * z).norm_squared());
+        }
+    }
+    let c = center + normal * (0.5 * (lo + hi)) - middle;
+    for d in 0..3 {
+        discs.center[d][lane] = c[d] as f32;
+        discs.normal[d][lane] = normal[d] as f32;
+    }
+    discs.radius[lane] = r2.sqrt() as f32;
+    discs.height[lane] = (0.5 * (hi - lo)) as f32;
+}
