@@ -6,6 +6,7 @@
 //! `spline` for why it is not the trilinear interpolant, and for its error).
 
 mod analytic;
+mod bounds;
 mod deform;
 mod field;
 mod grid;

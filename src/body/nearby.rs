@@ -6,10 +6,11 @@
 //! held against the nodes. Each node begins with the triangle that was nearest to the one before,
 //! so that the first number found is nearly the smallest.
 
-use super::tree::{Discs, Probe, Tree, WIDE, mask};
+use super::bounds::{Discs, Lanes, WIDE, lowest, within};
+use super::tree::{Probe, Tree};
 use crate::math::Vec3;
 
-/// A list of fewer groups than this is split into theirs.
+/// A list of fewer groups than this is split into theirs, down to groups of triangles.
 const SPLIT: usize = 32;
 
 /// Groups of one level of the tree, eight to a block.
@@ -49,7 +50,7 @@ impl List {
     fn cull(&mut self, from: &Self, probe: &Probe, reach2: f32) {
         self.clear(from.level);
         for (b, discs) in from.blocks.iter().enumerate() {
-            let bits = discs.within(&probe.local, reach2);
+            let bits = within(&discs.bounds(&probe.local), reach2);
             self.add(discs, bits, |lane| {
                 from.groups.get(b * WIDE + lane).copied()
             });
@@ -62,7 +63,7 @@ impl List {
         let count = tree.count(from.level - 1) as u32;
         for &group in &from.groups {
             let discs = tree.children(from.level, group as usize);
-            let bits = discs.within(&probe.local, reach2);
+            let bits = within(&discs.bounds(&probe.local), reach2);
             let first = group * WIDE as u32;
             self.add(discs, bits, |lane| {
                 Some(first + lane as u32).filter(|&g| g < count)
@@ -70,34 +71,41 @@ impl List {
         }
     }
 
-    /// Smallest distance to the listed groups; `place` as the hint of [`Tree::distance`].
+    /// Smallest distance to the listed groups; `place` becomes that of the nearest triangle.
     #[inline]
-    fn distance(&self, tree: &Tree, p: &Vec3, place: &mut usize) -> f64 {
+    fn distance(&self, tree: &Tree, p: &Vec3, bounds: &mut Vec<Lanes>, place: &mut usize) -> f64 {
         let probe = tree.probe(p);
-        let mut best = tree.distance2(*place, p);
-        let mut reach2 = probe.reach2(best.sqrt());
+        bounds.clear();
+        let mut first = (0, 0, f32::INFINITY);
         for (b, discs) in self.blocks.iter().enumerate() {
-            let bounds = discs.bounds(&probe.local);
-            let mut bits = mask(&bounds, reach2);
+            let block = discs.bounds(&probe.local);
+            let lane = lowest(&block);
+            if block[lane] < first.2 {
+                first = (b, lane, block[lane]);
+            }
+            bounds.push(block);
+        }
+        // the group that seems nearest first: after it few are left to look at
+        let mut best = f64::INFINITY;
+        let mut improve = |at: usize, best: &mut f64| {
+            if let Some(&group) = self.groups.get(at) {
+                tree.improve(&probe, self.level, group as usize, best, place);
+            }
+        };
+        improve(first.0 * WIDE + first.1, &mut best);
+        let mut reach2 = probe.reach2(best.sqrt());
+        for (b, block) in bounds.iter().enumerate() {
+            let mut bits = within(block, reach2);
+            if b == first.0 {
+                bits &= !(1 << first.1);
+            }
             while bits != 0 {
                 let lane = bits.trailing_zeros() as usize;
                 bits &= bits - 1;
-                if bounds[lane] > reach2 {
-                    continue;
+                if !(block[lane] > reach2) {
+                    improve(b * WIDE + lane, &mut best);
+                    reach2 = probe.reach2(best.sqrt());
                 }
-                let Some(&group) = self.groups.get(b * WIDE + lane) else {
-                    continue;
-                };
-                if self.level == 0 {
-                    let d2 = tree.distance2(group as usize, p);
-                    if d2 < best {
-                        best = d2;
-                        *place = group as usize;
-                    }
-                } else {
-                    tree.improve(&probe, self.level, group as usize, &mut best, place);
-                }
-                reach2 = probe.reach2(best.sqrt());
             }
         }
         best.sqrt()
@@ -111,6 +119,7 @@ pub(super) struct Sampler<'a> {
     brick: List,
     block: List,
     spare: List,
+    bounds: Vec<Lanes>,
 }
 
 impl<'a> Sampler<'a> {
@@ -121,6 +130,7 @@ impl<'a> Sampler<'a> {
             brick: List::default(),
             block: List::default(),
             spare: List::default(),
+            bounds: Vec::new(),
         }
     }
 
@@ -130,8 +140,8 @@ impl<'a> Sampler<'a> {
         let bar = limit * limit * (1.0 + 1e-12);
         let mut best = self.tree.distance2(self.hint, p).min(bar);
         let probe = self.tree.probe(p);
-        let (depth, place) = (self.tree.depth(), &mut self.hint);
-        self.tree.improve(&probe, depth, 0, &mut best, place);
+        let (root, place) = (self.tree.root(), &mut self.hint);
+        self.tree.improve(&probe, root, 0, &mut best, place);
         let d = best.sqrt();
         (best < bar && d <= limit).then_some(d)
     }
@@ -150,13 +160,9 @@ impl<'a> Sampler<'a> {
         let (whole, part) = (2.5981 * h, 0.8661 * h);
         let probe = tree.probe(center);
         let reach2 = probe.reach2(distance + 2.0 * whole);
-        self.brick.clear(tree.depth() - 1);
-        let top = tree.top();
-        let count = tree.count(tree.depth() - 1);
-        self.brick
-            .add(top, top.within(&probe.local, reach2), |lane| {
-                Some(lane as u32).filter(|&g| (g as usize) < count)
-            });
+        self.spare.clear(tree.root());
+        self.spare.groups.push(0);
+        self.brick.split(&self.spare, tree, &probe, reach2);
         narrow(&mut self.brick, &mut self.spare, tree, &probe, reach2);
         let mut out = [0.0; 64];
         for step in 0..8usize {
@@ -164,7 +170,9 @@ impl<'a> Sampler<'a> {
             let s = step ^ (step >> 1);
             let corner = [s >> 2 & 1, s >> 1 & 1, s & 1];
             let c = center + Vec3::from_fn(|d, _| (2.0 * corner[d] as f64 - 1.0) * h);
-            let near = self.brick.distance(tree, &c, &mut self.hint);
+            let near = self
+                .brick
+                .distance(tree, &c, &mut self.bounds, &mut self.hint);
             let probe = tree.probe(&c);
             let reach2 = probe.reach2(near + 2.0 * part);
             self.block.cull(&self.brick, &probe, reach2);
@@ -174,7 +182,9 @@ impl<'a> Sampler<'a> {
                 let i = [s >> 2 & 1, s >> 1 & 1, s & 1];
                 let n =
                     16 * (2 * corner[0] + i[0]) + 4 * (2 * corner[1] + i[1]) + 2 * corner[2] + i[2];
-                out[n] = self.block.distance(tree, &node(n), &mut self.hint);
+                out[n] = self
+                    .block
+                    .distance(tree, &node(n), &mut self.bounds, &mut self.hint);
             }
         }
         out
@@ -183,7 +193,7 @@ impl<'a> Sampler<'a> {
 
 /// Splits the groups of a short list.
 fn narrow(list: &mut List, spare: &mut List, tree: &Tree, probe: &Probe, reach2: f32) {
-    while list.level > 0 && list.groups.len() < SPLIT {
+    while list.level > 1 && list.groups.len() < SPLIT {
         spare.split(list, tree, probe, reach2);
         std::mem::swap(list, spare);
     }

@@ -4,94 +4,22 @@
 //! Triangles stand in an order in which every 8 that follow each other, every 64, every 512 and so
 //! on lie close together (halves along the longest axis, cut at multiples of the powers of 8), so
 //! that the tree needs no links: group `g` of a level has the groups `8 g ..= 8 g + 7` of the level
-//! below, down to single triangles. Every group is bounded by a thick disc: centre `c`, unit normal
-//! `n`, radius `R` and half thickness `t`. A point at `e` from the centre, with height `z = n . e`
-//! and `rho = |e - z n|` off the axis, is at least
-//!
-//! ```text
-//! sqrt( max(0, |z| - t)^2 + max(0, rho - R)^2 )
-//! ```
-//!
-//! away from all of it. A patch of a smooth surface is nearly flat and a box around it is not, which
-//! is why discs reject far more than boxes do. The bounds of eight groups are computed at once in
-//! f32 about the mesh's middle; `Tree::reach` widens what they are compared with beyond all rounding.
+//! below, down to single triangles (level 0). Groups and triangles are rejected eight at a time by
+//! the f32 bounds of `bounds`, taken about the mesh's middle; `Probe::reach2` widens what they are
+//! compared with beyond all rounding.
 //!
 //! Queries return the same bits whatever the order of the triangles: a group is left out only if it
 //! is farther than the best found, so that the answer is the minimum over all triangles of an f64
-//! number computed from that triangle alone. Where a bound is not a number, the group is looked at.
+//! number computed from that triangle alone.
 
+use super::bounds::{Discs, Prisms, WIDE, lowest, within};
 use super::triangle::Tri;
 use crate::math::Vec3;
 use crate::math::parallel::Workers;
 
-/// Groups in a group.
-pub(super) const WIDE: usize = 8;
-
 /// Part of the mesh's size and of the distance from its middle that f32 bounds may be wrong by:
 /// centres, normals and the point are rounded to 6e-8, and some ten operations follow.
 const ROUNDING: f64 = 4e-6;
-
-/// Eight thick discs.
-#[derive(Clone, Debug)]
-pub(super) struct Discs {
-    center: [[f32; WIDE]; 3],
-    normal: [[f32; WIDE]; 3],
-    radius: [f32; WIDE],
-    height: [f32; WIDE],
-}
-
-impl Discs {
-    /// Places for discs, all so far away that nothing finds them.
-    pub(super) const NONE: Self = Self {
-        center: [[1e15; WIDE]; 3],
-        normal: [[0.0; WIDE]; 3],
-        radius: [0.0; WIDE],
-        height: [0.0; WIDE],
-    };
-
-    /// Copies one disc.
-    #[inline]
-    pub(super) fn set(&mut self, to: usize, other: &Self, from: usize) {
-        for d in 0..3 {
-            self.center[d][to] = other.center[d][from];
-            self.normal[d][to] = other.normal[d][from];
-        }
-        self.radius[to] = other.radius[from];
-        self.height[to] = other.height[from];
-    }
-
-    /// Squared lower bounds of the distances to `p`.
-    #[inline]
-    pub(super) fn bounds(&self, p: &[f32; 3]) -> [f32; WIDE] {
-        // `f32::max` would also sort out what is not a number, which costs vector width
-        let positive = |x: f32| if x > 0.0 { x } else { 0.0 };
-        std::array::from_fn(|i| {
-            let e = [0, 1, 2].map(|d| p[d] - self.center[d][i]);
-            let n = [0, 1, 2].map(|d| self.normal[d][i]);
-            let z = e[0] * n[0] + e[1] * n[1] + e[2] * n[2];
-            let s = [0, 1, 2].map(|d| e[d] - z * n[d]);
-            let rho = (s[0] * s[0] + s[1] * s[1] + s[2] * s[2]).sqrt();
-            let up = positive(z.abs() - self.height[i]);
-            let off = positive(rho - self.radius[i]);
-            up * up + off * off
-        })
-    }
-
-    /// Bits of the discs whose bound does not exceed a squared reach.
-    #[inline]
-    pub(super) fn within(&self, p: &[f32; 3], reach2: f32) -> u32 {
-        mask(&self.bounds(p), reach2)
-    }
-}
-
-#[inline]
-pub(super) fn mask(bounds: &[f32; WIDE], reach2: f32) -> u32 {
-    let mut bits = 0;
-    for (i, &b) in bounds.iter().enumerate() {
-        bits |= u32::from(!(b > reach2)) << i;
-    }
-    bits
-}
 
 /// Which triangles have moved: per level of the tree and block of eight groups one bit per group.
 #[derive(Debug)]
@@ -129,8 +57,9 @@ impl Probe {
 #[derive(Clone, Debug)]
 pub(super) struct Tree {
     tris: Vec<Tri>,
-    /// Discs of the triangles, of groups of 8, of 64 and so on; the last level is one block.
-    levels: Vec<Vec<Discs>>,
+    prisms: Vec<Prisms>,
+    /// Discs of the groups of 8 triangles, of 64 and so on; the last level is one block.
+    discs: Vec<Vec<Discs>>,
     lo: Vec3,
     hi: Vec3,
     middle: Vec3,
@@ -153,18 +82,20 @@ impl Tree {
             .iter()
             .map(|&(_, id)| Tri::new(id, triangles[id as usize].map(|v| positions[v as usize])))
             .collect();
-        let mut levels = Vec::new();
-        let mut groups = triangles.len();
+        let mut groups = triangles.len().div_ceil(WIDE);
+        let prisms = vec![Prisms::NONE; groups];
+        let mut discs = Vec::new();
         loop {
             groups = groups.div_ceil(WIDE);
-            levels.push(vec![Discs::NONE; groups]);
+            discs.push(vec![Discs::NONE; groups]);
             if groups == 1 {
                 break;
             }
         }
         let mut tree = Self {
             tris,
-            levels,
+            prisms,
+            discs,
             lo: Vec3::zeros(),
             hi: Vec3::zeros(),
             middle: Vec3::zeros(),
@@ -178,7 +109,8 @@ impl Tree {
     /// Which triangles of the tree's mesh are moved by going from `before` to `after`.
     pub(super) fn moved(&self, triangles: &[[u32; 3]], before: &[Vec3], after: &[Vec3]) -> Moved {
         let mut count = 0;
-        let mut levels: Vec<Vec<u8>> = self.levels.iter().map(|l| vec![0; l.len()]).collect();
+        let mut levels = vec![vec![0u8; self.prisms.len()]];
+        levels.extend(self.discs.iter().map(|l| vec![0; l.len()]));
         for (i, tri) in self.tris.iter().enumerate() {
             let t = triangles[tri.id as usize].map(|v| v as usize);
             if t.iter().any(|&v| before[v] != after[v]) {
@@ -232,18 +164,28 @@ impl Tree {
     /// Bounds the groups anew, all or those with moved triangles.
     fn fit(&mut self, moved: Option<&Moved>, workers: &Workers) {
         let (tris, middle) = (&self.tris, self.middle);
-        let mut span = 1;
-        for (l, blocks) in self.levels.iter_mut().enumerate() {
+        let bits = |level: usize, block: usize| moved.map_or(u8::MAX, |m| m.levels[level][block]);
+        workers.chunks(&mut self.prisms, 64, |number, part| {
+            for (i, prisms) in part.iter_mut().enumerate() {
+                let block = number * 64 + i;
+                for lane in (0..WIDE).filter(|lane| bits(0, block) >> lane & 1 == 1) {
+                    if let Some(tri) = tris.get(block * WIDE + lane) {
+                        prisms.bound(lane, tri, &middle);
+                    }
+                }
+            }
+        });
+        let mut span = WIDE;
+        for (l, blocks) in self.discs.iter_mut().enumerate() {
             let chunk = (512 / span).max(1);
             workers.chunks(blocks, chunk, |number, part| {
                 for (i, discs) in part.iter_mut().enumerate() {
                     let block = number * chunk + i;
-                    let bits = moved.map_or(u8::MAX, |m| m.levels[l][block]);
-                    for lane in 0..WIDE {
+                    for lane in (0..WIDE).filter(|lane| bits(l + 1, block) >> lane & 1 == 1) {
                         let start = (block * WIDE + lane) * span;
-                        if bits >> lane & 1 == 1 && start < tris.len() {
-                            let group = &tris[start..(start + span).min(tris.len())];
-                            bound(group, &middle, discs, lane);
+                        if start < tris.len() {
+                            let end = tris.len().min(start + span);
+                            discs.bound(lane, &tris[start..end], &middle);
                         }
                     }
                 }
@@ -257,9 +199,9 @@ impl Tree {
         (self.lo, self.hi)
     }
 
-    /// Levels of groups; level 0 is the triangles.
-    pub(super) fn depth(&self) -> usize {
-        self.levels.len()
+    /// The level at which the mesh is one group.
+    pub(super) fn root(&self) -> usize {
+        self.discs.len() + 1
     }
 
     /// Number of groups of a level.
@@ -267,15 +209,10 @@ impl Tree {
         self.tris.len().div_ceil(WIDE.pow(level as u32))
     }
 
-    /// The discs of the top level.
-    pub(super) fn top(&self) -> &Discs {
-        &self.levels[self.levels.len() - 1][0]
-    }
-
-    /// The groups of which group `group` of `level` consists.
+    /// The groups of which group `group` of `level` (2 or more) consists.
     #[inline]
     pub(super) fn children(&self, level: usize, group: usize) -> &Discs {
-        &self.levels[level - 1][group]
+        &self.discs[level - 2][group]
     }
 
     #[inline]
@@ -299,7 +236,7 @@ impl Tree {
     pub(super) fn distance(&self, p: &Vec3, hint: &mut usize) -> f64 {
         let probe = self.probe(p);
         let mut best = self.distance2(*hint, p);
-        self.improve(&probe, self.depth(), 0, &mut best, hint);
+        self.improve(&probe, self.root(), 0, &mut best, hint);
         best.sqrt()
     }
 
@@ -314,21 +251,26 @@ impl Tree {
         place: &mut usize,
     ) {
         let reach2 = probe.reach2(best.sqrt());
-        self.visit(probe, (level, group), reach2, |i, tri| {
+        let lower = |i: usize, tri: &Tri| {
             let d2 = tri.distance2(&probe.p);
             if d2 < *best {
                 *best = d2;
                 *place = i;
             }
             probe.reach2(best.sqrt())
-        });
+        };
+        if level == 1 {
+            self.visit_triangles(probe, group, reach2, lower);
+        } else {
+            self.visit(probe, (level, group), reach2, lower);
+        }
     }
 
     /// Nearest triangle (the lowest number among equals) and its barycentric weights.
     pub(super) fn nearest(&self, p: &Vec3) -> (u32, [f64; 3]) {
         let probe = self.probe(p);
         let mut best = (f64::INFINITY, self.tris[0].id, (0.0, 0.0));
-        self.visit(&probe, (self.depth(), 0), f32::INFINITY, |_, t| {
+        self.visit(&probe, (self.root(), 0), f32::INFINITY, |_, t| {
             let (v, w) = t.closest(p);
             let d2 = (p - t.a - t.ab * v - t.ac * w).norm_squared();
             if d2 < best.0 || (d2 == best.0 && t.id < best.1) {
@@ -338,6 +280,31 @@ impl Tree {
         });
         let (v, w) = best.2;
         (best.1, [1.0 - v - w, v, w])
+    }
+
+    /// Calls `f` for those of eight triangles whose bounds do not exceed the squared reach, which `f`
+    /// returns anew.
+    #[inline]
+    fn visit_triangles(
+        &self,
+        probe: &Probe,
+        group: usize,
+        mut reach2: f32,
+        mut f: impl FnMut(usize, &Tri) -> f32,
+    ) -> f32 {
+        let bounds = self.prisms[group].bounds(&probe.local);
+        let mut bits = within(&bounds, reach2);
+        // the bounds are nearly the distances: after the lowest one few are left to look at
+        let mut lane = lowest(&bounds);
+        while bits != 0 {
+            bits &= !(1 << lane);
+            let place = group * WIDE + lane;
+            if !(bounds[lane] > reach2) && place < self.tris.len() {
+                reach2 = f(place, &self.tris[place]);
+            }
+            lane = bits.trailing_zeros() as usize;
+        }
+        reach2
     }
 
     /// Calls `f` for triangles of a group whose bounds do not exceed the squared reach, which `f`
@@ -360,28 +327,21 @@ impl Tree {
             if bound > reach2 {
                 continue;
             }
-            let bounds = self
-                .children(level as usize, group as usize)
-                .bounds(&probe.local);
-            let mut bits = mask(&bounds, reach2);
             if level == 1 {
-                while bits != 0 {
-                    let lane = bits.trailing_zeros() as usize;
-                    bits &= bits - 1;
-                    let place = group as usize * WIDE + lane;
-                    if !(bounds[lane] > reach2) && place < self.tris.len() {
-                        reach2 = f(place, &self.tris[place]);
-                    }
-                }
+                reach2 = self.visit_triangles(probe, group as usize, reach2, &mut f);
                 continue;
             }
+            let discs = self.children(level as usize, group as usize);
+            let bounds = discs.bounds(&probe.local);
+            let mut bits = within(&bounds, reach2);
+            let count = self.count(level as usize - 1) as u32;
             // the nearest on top
             let floor = top;
             while bits != 0 {
                 let lane = bits.trailing_zeros();
                 bits &= bits - 1;
                 let child = (bounds[lane as usize], level - 1, group * WIDE as u32 + lane);
-                if child.2 as usize >= self.levels[child.1 as usize - 1].len() {
+                if child.2 >= count {
                     continue;
                 }
                 let mut at = top;
@@ -401,24 +361,27 @@ impl Tree {
         let reach2 = probe.reach2(reach);
         let mut stack = [(0u32, 0u32); 96];
         let mut top = 1;
-        stack[0] = (self.depth() as u32, 0);
+        stack[0] = (self.root() as u32, 0);
         while top > 0 {
             top -= 1;
             let (level, group) = stack[top];
-            let below = level as usize - 1;
-            let flags = moved.levels[below][group as usize];
+            let flags = u32::from(moved.levels[level as usize - 1][group as usize]);
             if flags == 0 {
                 continue;
             }
-            let near = self.levels[below][group as usize].within(&probe.local, reach2);
-            let mut bits = near & u32::from(flags);
-            if below == 0 && bits != 0 {
-                return true;
+            if level == 1 {
+                let bounds = self.prisms[group as usize].bounds(&probe.local);
+                if within(&bounds, reach2) & flags != 0 {
+                    return true;
+                }
+                continue;
             }
+            let discs = self.children(level as usize, group as usize);
+            let mut bits = within(&discs.bounds(&probe.local), reach2) & flags;
             while bits != 0 {
                 let lane = bits.trailing_zeros();
                 bits &= bits - 1;
-                stack[top] = (below as u32, group * WIDE as u32 + lane);
+                stack[top] = (level - 1, group * WIDE as u32 + lane);
                 top += 1;
             }
         }
@@ -431,28 +394,27 @@ impl Tree {
         let d = to - from;
         let l2 = d.norm_squared();
         let margin = ROUNDING * (self.size + from.norm() + to.norm());
-        let mut stack = vec![(self.depth(), 0usize)];
+        let mut stack = vec![(self.root(), 0usize)];
         while let Some((level, group)) = stack.pop() {
+            if level == 1 {
+                let start = group * WIDE;
+                let end = self.tris.len().min(start + WIDE);
+                if self.tris[start..end].iter().any(|tri| tri.crosses(p, q)) {
+                    return true;
+                }
+                continue;
+            }
             let discs = self.children(level, group);
             for lane in 0..WIDE {
-                let child = group * WIDE + lane;
-                // the ball around the disc
-                let c = Vec3::from_fn(|k, _| f64::from(discs.center[k][lane]));
+                let (c, radius) = discs.ball(lane);
                 let t = if l2 > 0.0 {
                     ((c - from).dot(&d) / l2).clamp(0.0, 1.0)
                 } else {
                     0.0
                 };
-                let ball = f64::from(discs.radius[lane]).hypot(f64::from(discs.height[lane]));
-                if (from + d * t - c).norm() > ball + margin {
-                    continue;
-                }
-                if level > 1 {
-                    if child < self.levels[level - 2].len() {
-                        stack.push((level - 1, child));
-                    }
-                } else if self.tris.get(child).is_some_and(|tri| tri.crosses(p, q)) {
-                    return true;
+                let child = group * WIDE + lane;
+                if (from + d * t - c).norm() <= radius + margin && child < self.count(level - 1) {
+                    stack.push((level - 1, child));
                 }
             }
         }
@@ -490,33 +452,4 @@ fn arrange(order: &mut [(Vec3, u32)]) {
         work.push((start, start + half));
         work.push((start + half, end));
     }
-}
-
-/// Thick disc around triangles, about `middle`: centre at the mean of theirs and in the middle of
-/// their heights, normal along their areas' sum.
-fn bound(tris: &[Tri], middle: &Vec3, discs: &mut Discs, lane: usize) {
-    let (mut center, mut normal) = (Vec3::zeros(), Vec3::zeros());
-    for t in tris {
-        center += t.a + (t.ab + t.ac) / 3.0;
-        normal += t.ab.cross(&t.ac);
-    }
-    center /= tris.len() as f64;
-    let normal = normal.try_normalize(f64::MIN_POSITIVE).unwrap_or_default();
-    let (mut lo, mut hi, mut r2) = (f64::INFINITY, f64::NEG_INFINITY, 0.0f64);
-    for t in tris {
-        let e = t.a - center;
-        for e in [e, e + t.ab, e + t.ac] {
-            let z = normal.dot(&e);
-            lo = lo.min(z);
-            hi = hi.max(z);
-            r2 = r2.max((e - normal * z).norm_squared());
-        }
-    }
-    let c = center + normal * (0.5 * (lo + hi)) - middle;
-    for d in 0..3 {
-        discs.center[d][lane] = c[d] as f32;
-        discs.normal[d][lane] = normal[d] as f32;
-    }
-    discs.radius[lane] = r2.sqrt() as f32;
-    discs.height[lane] = (0.5 * (hi - lo)) as f32;
 }
