@@ -4,7 +4,7 @@
 //! and per frame of a deforming body (`all`: every vertex moves; `arm`: about a fifth of them;
 //! `spot`: a dent of 5 cm); memory of the field [MB]; error of the distance against the triangles
 //! at points within two cells of the surface (mean and largest, in cells). Wall time, the least of
-//! `repeats` (first argument, 3); the processor time of all threads stands in brackets.
+//! `repeats` (first argument, 3; a second one names the only file to take); the processor time of all threads stands in brackets.
 //!
 //! Real bodies are read from the folder that `TOILE_DATA` names; the shipped mannequin needs none.
 #![allow(
@@ -133,13 +133,19 @@ fn main() {
         .filter_map(|a| a.parse().ok())
         .next()
         .unwrap_or(3);
-    let (p, t) = mannequin::body(0.01).expect("mannequin").display_mesh();
-    row("mannequin", &p, &t, 0.0, repeats);
+    let only = std::env::args().skip(1).find(|a| a.ends_with(".obj"));
+    if only.is_none() {
+        let (p, t) = mannequin::body(0.01).expect("mannequin").display_mesh();
+        row("mannequin", &p, &t, 0.0, repeats);
+    }
     let Some(folder) = std::env::var_os("TOILE_DATA") else {
         println!("TOILE_DATA is unset: no real bodies");
         return;
     };
     for name in ["mean_all.obj", "makehuman_body_closed_m.obj"] {
+        if only.as_ref().is_some_and(|o| o != name) {
+            continue;
+        }
         let path = std::path::Path::new(&folder).join("bodies").join(name);
         let (p, t) = read_obj(&path, 1.0).expect("body");
         row(name, &p, &t, 0.005, repeats);

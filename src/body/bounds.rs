@@ -11,15 +11,15 @@
 //! away from all of it. A patch of a smooth surface is nearly flat and a box around it is not, which
 //! is why discs reject far more than boxes do.
 //!
-//! A single triangle is bounded by a prism: the same slab, cut by three half spaces
-//! `m_k . e <= o_k` with `m_k` across `n` and the edges,
+//! A single triangle is bounded by a prism: its plane `n . x = o`, cut by three half spaces
+//! `m_k . x <= o_k` with `m_k` across `n` and the edges,
 //!
 //! ```text
-//! sqrt( max(0, |z| - t)^2 + max(0, m_1 . e - o_1, m_2 . e - o_2, m_3 . e - o_3)^2 )
+//! sqrt( (n . x - o)^2 + max(0, m_1 . x - o_1, m_2 . x - o_2, m_3 . x - o_3)^2 )
 //! ```
 //!
-//! which is the distance itself unless a corner is nearest. Thickness and offsets are taken from the
-//! corners, so that a normal spoilt by a sliver makes a bound poor, never wrong.
+//! which is the distance itself unless a corner is nearest. The offsets are taken from the corners,
+//! and a normal spoilt by a sliver is given up, so that such a bound is poor but never wrong.
 //!
 //! Rounding is the caller's to allow for (`tree::Probe::reach2`). What is not a number counts as 0.
 
@@ -40,15 +40,13 @@ pub(super) struct Discs {
     height: Lanes,
 }
 
+/// Bound of a triangle: the plane and the three half spaces, each as its vector and its offset.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Prism([[f32; 4]; 4]);
+
 /// Bounds of eight triangles.
 #[derive(Clone, Debug)]
-pub(super) struct Prisms {
-    center: [Lanes; 3],
-    normal: [Lanes; 3],
-    height: Lanes,
-    sides: [[Lanes; 3]; 3],
-    offsets: [Lanes; 3],
-}
+pub(super) struct Prisms([[Lanes; 4]; 4]);
 
 /// `f32::max(x, 0)` would also sort out what is not a number, which costs vector width.
 #[inline]
@@ -84,26 +82,34 @@ fn put(v: &mut [Lanes; 3], i: usize, x: &Vec3) {
     }
 }
 
+/// Bits of the bounds that do not exceed their squared reaches.
+#[inline]
+pub(super) fn within_each(bounds: &Lanes, reach2: &Lanes) -> u32 {
+    let mut bits = [0u32; WIDE];
+    for i in 0..WIDE {
+        bits[i] = if bounds[i] > reach2[i] { 0 } else { 1 << i };
+    }
+    bits.iter().fold(0, |a, b| a | b)
+}
+
 /// Bits of the bounds that do not exceed a squared reach.
 #[inline]
 pub(super) fn within(bounds: &Lanes, reach2: f32) -> u32 {
-    let mut bits = 0;
-    for (i, &b) in bounds.iter().enumerate() {
-        bits |= u32::from(!(b > reach2)) << i;
-    }
-    bits
+    within_each(bounds, &[reach2; WIDE])
 }
 
-/// Place of the smallest bound.
+/// Bits of the smallest bounds; of all where one is not a number.
 #[inline]
-pub(super) fn lowest(bounds: &Lanes) -> usize {
-    let mut best = 0;
-    for i in 1..WIDE {
-        if bounds[i] < bounds[best] {
-            best = i;
-        }
+pub(super) fn lowest(bounds: &Lanes) -> u32 {
+    let mut low = [0.0; 4];
+    for i in 0..4 {
+        let (a, b) = (bounds[i], bounds[i + 4]);
+        low[i] = if b < a { b } else { a };
     }
-    best
+    let low = low
+        .iter()
+        .fold(f32::INFINITY, |a, &b| if b < a { b } else { a });
+    within(bounds, low)
 }
 
 impl Discs {
@@ -182,45 +188,24 @@ impl Discs {
     }
 }
 
-impl Prisms {
-    /// Places for triangles, all so far away that nothing finds them.
-    pub(super) const NONE: Self = Self {
-        center: [[1e15; WIDE]; 3],
-        normal: [[0.0; WIDE]; 3],
-        height: [0.0; WIDE],
-        sides: [[[-1.0; WIDE]; 3]; 3],
-        offsets: [[0.0; WIDE]; 3],
-    };
-
-    /// Squared lower bounds of the distances to `p`.
-    #[inline]
-    pub(super) fn bounds(&self, p: &[f32; 3]) -> Lanes {
-        let e = from_centers(p, &self.center);
-        let z = dot(&e, &self.normal);
-        let s = [
-            dot(&e, &self.sides[0]),
-            dot(&e, &self.sides[1]),
-            dot(&e, &self.sides[2]),
-        ];
-        let mut out = [0.0; WIDE];
-        for i in 0..WIDE {
-            let up = positive(z[i].abs() - self.height[i]);
-            let a = positive(s[0][i] - self.offsets[0][i]);
-            let b = s[1][i] - self.offsets[1][i];
-            let b = if b > a { b } else { a };
-            let c = s[2][i] - self.offsets[2][i];
-            let c = if c > b { c } else { b };
-            out[i] = up * up + c * c;
-        }
-        out
-    }
-
-    /// Bounds one triangle, about `middle`.
-    pub(super) fn bound(&mut self, i: usize, t: &Tri, middle: &Vec3) {
-        let normal = unit(&t.ab.cross(&t.ac));
-        let mean = (t.ab + t.ac) / 3.0;
-        let corners = [-mean, t.ab - mean, t.ac - mean];
+impl Prism {
+    /// Bounds a triangle, about `middle`. A thickness up to `flat` [m] is left to the caller's
+    /// allowance for rounding.
+    pub(super) fn new(t: &Tri, middle: &Vec3, flat: f64) -> Self {
+        let center = t.a + (t.ab + t.ac) / 3.0;
+        let e = t.a - center;
+        let corners = [e, e + t.ab, e + t.ac];
         let edges = [t.ab, t.ac - t.ab, -t.ac];
+        let mut normal = unit(&t.ab.cross(&t.ac));
+        if corners.iter().any(|c| normal.dot(c).abs() > flat) {
+            normal = Vec3::zeros();
+        }
+        let from_middle = center - middle;
+        let pack = |m: &Vec3, offset: f64| {
+            let o = offset + m.dot(&from_middle);
+            [m.x as f32, m.y as f32, m.z as f32, o as f32]
+        };
+        let mut parts = [pack(&normal, 0.0); 4];
         for k in 0..3 {
             // across the edge and outward; along it where there is no normal
             let side = if normal == Vec3::zeros() {
@@ -228,15 +213,67 @@ impl Prisms {
             } else {
                 unit(&edges[k].cross(&normal))
             };
-            let top = |o: f64, e: &Vec3| o.max(side.dot(e));
-            put(&mut self.sides[k], i, &side);
-            self.offsets[k][i] = corners.iter().fold(f64::NEG_INFINITY, top) as f32;
+            let top = |o: f64, c: &Vec3| o.max(side.dot(c));
+            let offset = corners.iter().fold(f64::NEG_INFINITY, top);
+            parts[k + 1] = pack(&side, offset);
         }
-        let high = |h: f64, e: &Vec3| h.max(normal.dot(e).abs());
-        self.height[i] = corners.iter().fold(0.0, high) as f32;
-        put(&mut self.normal, i, &normal);
-        put(&mut self.center, i, &(t.a + mean - middle));
+        Self(parts)
     }
+
+    /// Squared lower bounds of the distances to eight points.
+    #[inline]
+    pub(super) fn bounds(&self, points: &[Lanes; 3]) -> Lanes {
+        let along = |m: &[f32; 4]| {
+            let mut out = [0.0; WIDE];
+            for i in 0..WIDE {
+                out[i] = m[0] * points[0][i] + m[1] * points[1][i] + m[2] * points[2][i] - m[3];
+            }
+            out
+        };
+        let [n, a, b, c] = &self.0;
+        join(&along(n), &along(a), &along(b), &along(c))
+    }
+}
+
+impl Prisms {
+    /// Places for triangles, all so far away that nothing finds them.
+    pub(super) const NONE: Self = Self([[[0.0; WIDE], [0.0; WIDE], [0.0; WIDE], [-1e15; WIDE]]; 4]);
+
+    /// Puts a triangle in its place.
+    pub(super) fn set(&mut self, i: usize, prism: &Prism) {
+        for (to, from) in self.0.iter_mut().zip(&prism.0) {
+            for (lanes, &value) in to.iter_mut().zip(from) {
+                lanes[i] = value;
+            }
+        }
+    }
+
+    /// Squared lower bounds of the distances to `p`.
+    #[inline]
+    pub(super) fn bounds(&self, p: &[f32; 3]) -> Lanes {
+        let along = |m: &[Lanes; 4]| {
+            let mut out = [0.0; WIDE];
+            for i in 0..WIDE {
+                out[i] = m[0][i] * p[0] + m[1][i] * p[1] + m[2][i] * p[2] - m[3][i];
+            }
+            out
+        };
+        let [n, a, b, c] = &self.0;
+        join(&along(n), &along(a), &along(b), &along(c))
+    }
+}
+
+/// Squared distance off a plane and beyond the farthest of three half spaces.
+#[inline]
+fn join(z: &Lanes, a: &Lanes, b: &Lanes, c: &Lanes) -> Lanes {
+    let mut out = [0.0; WIDE];
+    for i in 0..WIDE {
+        let off = positive(a[i]);
+        let off = if b[i] > off { b[i] } else { off };
+        let off = if c[i] > off { c[i] } else { off };
+        out[i] = z[i] * z[i] + off * off;
+    }
+    out
 }
 
 fn unit(v: &Vec3) -> Vec3 {

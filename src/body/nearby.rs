@@ -6,12 +6,14 @@
 //! held against the nodes. Each node begins with the triangle that was nearest to the one before,
 //! so that the first number found is nearly the smallest.
 
-use super::bounds::{Discs, Lanes, WIDE, lowest, within};
+use super::bounds::{Discs, Lanes, WIDE, lowest, within, within_each};
 use super::tree::{Probe, Tree};
 use crate::math::Vec3;
 
 /// A list of fewer groups than this is split into theirs, down to groups of triangles.
 const SPLIT: usize = 32;
+/// Up to this many groups of triangles are held against eight nodes at once.
+const MANY: usize = 48;
 
 /// Groups of one level of the tree, eight to a block.
 #[derive(Default)]
@@ -79,7 +81,7 @@ impl List {
         let mut first = (0, 0, f32::INFINITY);
         for (b, discs) in self.blocks.iter().enumerate() {
             let block = discs.bounds(&probe.local);
-            let lane = lowest(&block);
+            let lane = lowest(&block).trailing_zeros() as usize;
             if block[lane] < first.2 {
                 first = (b, lane, block[lane]);
             }
@@ -112,6 +114,76 @@ impl List {
     }
 }
 
+/// Triangles listed for eight points.
+#[derive(Default)]
+struct Faces {
+    places: Vec<u32>,
+    bounds: Vec<Lanes>,
+}
+
+impl Faces {
+    /// The triangles of listed groups of eight that are within reach.
+    fn collect(&mut self, list: &List, tree: &Tree, probe: &Probe, reach2: f32) {
+        self.places.clear();
+        let count = tree.count(0) as u32;
+        for &group in &list.groups {
+            let mut bits = within(&tree.triangles(group as usize).bounds(&probe.local), reach2);
+            while bits != 0 {
+                let place = group * WIDE as u32 + bits.trailing_zeros();
+                bits &= bits - 1;
+                if place < count {
+                    self.places.push(place);
+                }
+            }
+        }
+    }
+
+    /// Smallest distances to the listed triangles.
+    fn distances(&mut self, tree: &Tree, points: &[Vec3; WIDE]) -> [f64; WIDE] {
+        let probes = points.map(|p| tree.probe(&p));
+        let mut local = [[0.0; WIDE]; 3];
+        for (i, probe) in probes.iter().enumerate() {
+            for d in 0..3 {
+                local[d][i] = probe.local[d];
+            }
+        }
+        self.bounds.clear();
+        let mut low = [f32::INFINITY; WIDE];
+        let mut which = [0u32; WIDE];
+        for (k, &place) in (0u32..).zip(&self.places) {
+            let bounds = tree.triangle(place as usize).bounds(&local);
+            for i in 0..WIDE {
+                which[i] = if bounds[i] < low[i] { k } else { which[i] };
+                low[i] = if bounds[i] < low[i] {
+                    bounds[i]
+                } else {
+                    low[i]
+                };
+            }
+            self.bounds.push(bounds);
+        }
+        // the bounds are nearly the distances: after the lowest one few are left to look at
+        let exact = |k: usize, i: usize| tree.distance2(self.places[k] as usize, &points[i]);
+        let mut best: [f64; WIDE] = std::array::from_fn(|i| exact(which[i] as usize, i));
+        let mut reach2: Lanes = std::array::from_fn(|i| probes[i].reach2(best[i].sqrt()));
+        for (k, bounds) in self.bounds.iter().enumerate() {
+            let mut bits = within_each(bounds, &reach2);
+            while bits != 0 {
+                let i = bits.trailing_zeros() as usize;
+                bits &= bits - 1;
+                if which[i] as usize != k {
+                    let d2 = exact(k, i);
+                    if d2 < best[i] {
+                        best[i] = d2;
+                        reach2[i] = probes[i].reach2(d2.sqrt());
+                    }
+                }
+            }
+        }
+        best.map(f64::sqrt)
+    }
+}
+
 /// Distances at bricks of one tree; works fastest on bricks that follow each other in space.
 pub(super) struct Sampler<'a> {
     tree: &'a Tree,
@@ -120,6 +192,7 @@ pub(super) struct Sampler<'a> {
     block: List,
     spare: List,
     bounds: Vec<Lanes>,
+    faces: Faces,
 }
 
 impl<'a> Sampler<'a> {
@@ -131,6 +204,7 @@ impl<'a> Sampler<'a> {
             block: List::default(),
             spare: List::default(),
             bounds: Vec::new(),
+            faces: Faces::default(),
         }
     }
 
@@ -177,14 +251,24 @@ impl<'a> Sampler<'a> {
             let reach2 = probe.reach2(near + 2.0 * part);
             self.block.cull(&self.brick, &probe, reach2);
             narrow(&mut self.block, &mut self.spare, tree, &probe, reach2);
-            for step in 0..8usize {
-                let s = step ^ (step >> 1);
-                let i = [s >> 2 & 1, s >> 1 & 1, s & 1];
-                let n =
-                    16 * (2 * corner[0] + i[0]) + 4 * (2 * corner[1] + i[1]) + 2 * corner[2] + i[2];
-                out[n] = self
-                    .block
-                    .distance(tree, &node(n), &mut self.bounds, &mut self.hint);
+            let at = |m: usize| {
+                let i = [m >> 2, m >> 1 & 1, m & 1];
+                16 * (2 * corner[0] + i[0]) + 4 * (2 * corner[1] + i[1]) + 2 * corner[2] + i[2]
+            };
+            if self.block.level == 1 && self.block.groups.len() <= MANY {
+                self.faces.collect(&self.block, tree, &probe, reach2);
+                let points = std::array::from_fn(|m| node(at(m)));
+                let found = self.faces.distances(tree, &points);
+                for (m, d) in found.into_iter().enumerate() {
+                    out[at(m)] = d;
+                }
+            } else {
+                for m in (0..8).map(|m| m ^ (m >> 1)) {
+                    let p = node(at(m));
+                    out[at(m)] = self
+                        .block
+                        .distance(tree, &p, &mut self.bounds, &mut self.hint);
+                }
             }
         }
         out

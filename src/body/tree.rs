@@ -12,7 +12,7 @@
 //! is farther than the best found, so that the answer is the minimum over all triangles of an f64
 //! number computed from that triangle alone.
 
-use super::bounds::{Discs, Prisms, WIDE, lowest, within};
+use super::bounds::{Discs, Prism, Prisms, WIDE, lowest, within};
 use super::triangle::Tri;
 use crate::math::Vec3;
 use crate::math::parallel::Workers;
@@ -20,6 +20,8 @@ use crate::math::parallel::Workers;
 /// Part of the mesh's size and of the distance from its middle that f32 bounds may be wrong by:
 /// centres, normals and the point are rounded to 6e-8, and some ten operations follow.
 const ROUNDING: f64 = 4e-6;
+/// Part of the mesh's size that a prism may be thick.
+const FLAT: f64 = 5e-7;
 
 /// Which triangles have moved: per level of the tree and block of eight groups one bit per group.
 #[derive(Debug)]
@@ -57,6 +59,8 @@ impl Probe {
 #[derive(Clone, Debug)]
 pub(super) struct Tree {
     tris: Vec<Tri>,
+    /// Bounds of the triangles one by one and eight at a time.
+    singles: Vec<Prism>,
     prisms: Vec<Prisms>,
     /// Discs of the groups of 8 triangles, of 64 and so on; the last level is one block.
     discs: Vec<Vec<Discs>>,
@@ -93,6 +97,7 @@ impl Tree {
             }
         }
         let mut tree = Self {
+            singles: Vec::new(),
             tris,
             prisms,
             discs,
@@ -165,12 +170,25 @@ impl Tree {
     fn fit(&mut self, moved: Option<&Moved>, workers: &Workers) {
         let (tris, middle) = (&self.tris, self.middle);
         let bits = |level: usize, block: usize| moved.map_or(u8::MAX, |m| m.levels[level][block]);
+        let flat = FLAT * self.size;
+        if self.singles.len() != tris.len() {
+            self.singles = vec![Prism::default(); tris.len()];
+        }
+        workers.chunks(&mut self.singles, 512, |number, part| {
+            for (i, prism) in part.iter_mut().enumerate() {
+                let place = number * 512 + i;
+                if bits(0, place / WIDE) >> (place % WIDE) & 1 == 1 {
+                    *prism = Prism::new(&tris[place], &middle, flat);
+                }
+            }
+        });
+        let singles = &self.singles;
         workers.chunks(&mut self.prisms, 64, |number, part| {
             for (i, prisms) in part.iter_mut().enumerate() {
                 let block = number * 64 + i;
                 for lane in (0..WIDE).filter(|lane| bits(0, block) >> lane & 1 == 1) {
-                    if let Some(tri) = tris.get(block * WIDE + lane) {
-                        prisms.bound(lane, tri, &middle);
+                    if let Some(prism) = singles.get(block * WIDE + lane) {
+                        prisms.set(lane, prism);
                     }
                 }
             }
@@ -223,6 +241,18 @@ impl Tree {
             local: [e.x as f32, e.y as f32, e.z as f32],
             margin: ROUNDING * (self.size + e.norm()),
         }
+    }
+
+    /// Bounds of the triangles of a group of eight.
+    #[inline]
+    pub(super) fn triangles(&self, group: usize) -> &Prisms {
+        &self.prisms[group]
+    }
+
+    /// Bound of a triangle, by its place in the tree's order.
+    #[inline]
+    pub(super) fn triangle(&self, place: usize) -> &Prism {
+        &self.singles[place]
     }
 
     /// Squared distance of a triangle, by its place in the tree's order.
@@ -295,7 +325,7 @@ impl Tree {
         let bounds = self.prisms[group].bounds(&probe.local);
         let mut bits = within(&bounds, reach2);
         // the bounds are nearly the distances: after the lowest one few are left to look at
-        let mut lane = lowest(&bounds);
+        let mut lane = lowest(&bounds).trailing_zeros() as usize;
         while bits != 0 {
             bits &= !(1 << lane);
             let place = group * WIDE + lane;
