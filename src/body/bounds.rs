@@ -11,15 +11,16 @@
 //! away from all of it. A patch of a smooth surface is nearly flat and a box around it is not, which
 //! is why discs reject far more than boxes do.
 //!
-//! A single triangle is bounded by a prism: its plane `n . x = o`, cut by three half spaces
-//! `m_k . x <= o_k` with `m_k` across `n` and the edges,
+//! A single triangle is bounded by a disc without thickness that three half spaces
+//! `m_k . e <= o_k` cut to its shape, with `m_k` across `n` and the edges,
 //!
 //! ```text
-//! sqrt( (n . x - o)^2 + max(0, m_1 . x - o_1, m_2 . x - o_2, m_3 . x - o_3)^2 )
+//! sqrt( z^2 + max(0, m_1 . e - o_1, m_2 . e - o_2, m_3 . e - o_3, rho - R)^2 )
 //! ```
 //!
-//! which is the distance itself unless a corner is nearest. The offsets are taken from the corners,
-//! and a normal spoilt by a sliver is given up, so that such a bound is poor but never wrong.
+//! which is the distance itself unless a corner is nearest. Offsets and radius are taken from the
+//! corners, and a normal spoilt by a sliver is given up, so that such a bound is poor but never
+//! wrong.
 //!
 //! Rounding is the caller's to allow for (`tree::Probe::reach2`). What is not a number counts as 0.
 
@@ -40,13 +41,13 @@ pub(super) struct Discs {
     height: Lanes,
 }
 
-/// Bound of a triangle: the plane and the three half spaces, each as its vector and its offset.
+/// Bound of a triangle: centre and radius, normal, the three half spaces with their offsets.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Prism([[f32; 4]; 4]);
+pub(super) struct Prism([[f32; 4]; 5]);
 
 /// Bounds of eight triangles.
 #[derive(Clone, Debug)]
-pub(super) struct Prisms([[Lanes; 4]; 4]);
+pub(super) struct Prisms([[Lanes; 4]; 5]);
 
 /// `f32::max(x, 0)` would also sort out what is not a number, which costs vector width.
 #[inline]
@@ -200,12 +201,10 @@ impl Prism {
         if corners.iter().any(|c| normal.dot(c).abs() > flat) {
             normal = Vec3::zeros();
         }
-        let from_middle = center - middle;
-        let pack = |m: &Vec3, offset: f64| {
-            let o = offset + m.dot(&from_middle);
-            [m.x as f32, m.y as f32, m.z as f32, o as f32]
-        };
-        let mut parts = [pack(&normal, 0.0); 4];
+        let pack = |m: &Vec3, o: f64| [m.x as f32, m.y as f32, m.z as f32, o as f32];
+        let radius = corners.iter().map(Vec3::norm).fold(0.0, f64::max);
+        let mut parts = [pack(&(center - middle), radius); 5];
+        parts[1] = pack(&normal, 0.0);
         for k in 0..3 {
             // across the edge and outward; along it where there is no normal
             let side = if normal == Vec3::zeros() {
@@ -215,7 +214,7 @@ impl Prism {
             };
             let top = |o: f64, c: &Vec3| o.max(side.dot(c));
             let offset = corners.iter().fold(f64::NEG_INFINITY, top);
-            parts[k + 1] = pack(&side, offset);
+            parts[k + 2] = pack(&side, offset);
         }
         Self(parts)
     }
@@ -223,21 +222,22 @@ impl Prism {
     /// Squared lower bounds of the distances to eight points.
     #[inline]
     pub(super) fn bounds(&self, points: &[Lanes; 3]) -> Lanes {
-        let along = |m: &[f32; 4]| {
-            let mut out = [0.0; WIDE];
-            for i in 0..WIDE {
-                out[i] = m[0] * points[0][i] + m[1] * points[1][i] + m[2] * points[2][i] - m[3];
-            }
-            out
-        };
-        let [n, a, b, c] = &self.0;
-        join(&along(n), &along(a), &along(b), &along(c))
+        let mut out = [0.0; WIDE];
+        for i in 0..WIDE {
+            let p = [points[0][i], points[1][i], points[2][i]];
+            out[i] = prism(&p, |k, d| self.0[k][d]);
+        }
+        out
     }
 }
 
 impl Prisms {
     /// Places for triangles, all so far away that nothing finds them.
-    pub(super) const NONE: Self = Self([[[0.0; WIDE], [0.0; WIDE], [0.0; WIDE], [-1e15; WIDE]]; 4]);
+    pub(super) const NONE: Self = {
+        let mut all = [[[0.0; WIDE]; 4]; 5];
+        all[0][0] = [1e15; WIDE];
+        Self(all)
+    };
 
     /// Puts a triangle in its place.
     pub(super) fn set(&mut self, i: usize, prism: &Prism) {
@@ -251,29 +251,30 @@ impl Prisms {
     /// Squared lower bounds of the distances to `p`.
     #[inline]
     pub(super) fn bounds(&self, p: &[f32; 3]) -> Lanes {
-        let along = |m: &[Lanes; 4]| {
-            let mut out = [0.0; WIDE];
-            for i in 0..WIDE {
-                out[i] = m[0][i] * p[0] + m[1][i] * p[1] + m[2][i] * p[2] - m[3][i];
-            }
-            out
-        };
-        let [n, a, b, c] = &self.0;
-        join(&along(n), &along(a), &along(b), &along(c))
+        let mut out = [0.0; WIDE];
+        for i in 0..WIDE {
+            out[i] = prism(p, |k, d| self.0[k][d][i]);
+        }
+        out
     }
 }
 
-/// Squared distance off a plane and beyond the farthest of three half spaces.
-#[inline]
-fn join(z: &Lanes, a: &Lanes, b: &Lanes, c: &Lanes) -> Lanes {
-    let mut out = [0.0; WIDE];
-    for i in 0..WIDE {
-        let off = positive(a[i]);
-        let off = if b[i] > off { b[i] } else { off };
-        let off = if c[i] > off { c[i] } else { off };
-        out[i] = z[i] * z[i] + off * off;
-    }
-    out
+/// The bound of a triangle with the numbers `b(k, d)`.
+#[inline(always)]
+fn prism(p: &[f32; 3], b: impl Fn(usize, usize) -> f32) -> f32 {
+    let e = [p[0] - b(0, 0), p[1] - b(0, 1), p[2] - b(0, 2)];
+    let z = e[0] * b(1, 0) + e[1] * b(1, 1) + e[2] * b(1, 2);
+    let e2 = e[0] * e[0] + e[1] * e[1] + e[2] * e[2];
+    // less what the difference loses by rounding
+    let rho2 = positive(e2 - z * z - 1e-6 * e2);
+    let off = positive(rho2.sqrt() - b(0, 3));
+    let s0 = e[0] * b(2, 0) + e[1] * b(2, 1) + e[2] * b(2, 2) - b(2, 3);
+    let s1 = e[0] * b(3, 0) + e[1] * b(3, 1) + e[2] * b(3, 2) - b(3, 3);
+    let s2 = e[0] * b(4, 0) + e[1] * b(4, 1) + e[2] * b(4, 2) - b(4, 3);
+    let off = if s0 > off { s0 } else { off };
+    let off = if s1 > off { s1 } else { off };
+    let off = if s2 > off { s2 } else { off };
+    z * z + off * off
 }
 
 fn unit(v: &Vec3) -> Vec3 {
