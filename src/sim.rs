@@ -216,7 +216,13 @@ impl Sim {
         let state = &mut self.state.bodies[b];
         if !state.moved_with_time {
             // a placement: the deformed field must exist before anything is changed
-            self.bodies[b].0.deformed(&vertices)?;
+            self.bodies[b].0.deformed_with(
+                &vertices,
+                self.engine
+                    .lock()
+                    .unwrap_or_else(PoisonError::into_inner)
+                    .workers(),
+            )?;
             state.vertices.clone_from(&vertices);
             state.target_vertices.clear();
         } else {

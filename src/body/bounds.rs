@@ -86,11 +86,16 @@ fn put(v: &mut [Lanes; 3], i: usize, x: &Vec3) {
 /// Bits of the bounds that do not exceed their squared reaches.
 #[inline]
 pub(super) fn within_each(bounds: &Lanes, reach2: &Lanes) -> u32 {
-    let mut bits = [0u32; WIDE];
+    let mut out = [0u32; WIDE];
     for i in 0..WIDE {
-        bits[i] = if bounds[i] > reach2[i] { 0 } else { 1 << i };
+        out[i] = u32::from(!(bounds[i] > reach2[i]));
     }
-    bits.iter().fold(0, |a, b| a | b)
+    // most often there are none
+    let mut bits = out.iter().fold(0, |a, b| a | b);
+    if bits != 0 {
+        bits = (0..WIDE).fold(0, |a, i| a | out[i] << i);
+    }
+    bits
 }
 
 /// Bits of the bounds that do not exceed a squared reach.

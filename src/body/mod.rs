@@ -27,6 +27,14 @@ use crate::math::parallel::Workers;
 use crate::math::{Mat3, Rotation, Vec3};
 use std::sync::Arc;
 
+/// Largest whole number not above `x`, without the library call that `f64::floor` is where the
+/// processor's instruction for it may not be used.
+#[inline]
+fn floor(x: f64) -> i64 {
+    let whole = x as i64;
+    whole - i64::from((whole as f64) > x)
+}
+
 /// Positions [m] and triangles of a Wavefront OBJ file, in the file's order; `scale` multiplies its
 /// coordinates. The mesh need not be closed.
 pub fn read_obj(path: &std::path::Path, scale: f64) -> Result<mannequin::Mesh> {

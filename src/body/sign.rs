@@ -12,6 +12,7 @@
 //! At a point: the generalized winding number (Jacobson, Kavan, Sorkine 2013) as the sum of exact
 //! solid angles (Van Oosterom and Strackee 1983).
 
+use super::floor;
 use crate::math::Vec3;
 use crate::math::parallel::Workers;
 
@@ -98,7 +99,7 @@ type Crossing = (u32, f64, i8);
 fn range(lo: f64, hi: f64, h: f64) -> (i64, i64) {
     let (a, b) = (lo / h - 0.5, hi / h - 0.5);
     let pad = 1e-6 + 1e-15 * a.abs().max(b.abs());
-    ((a - pad).ceil() as i64, (b + pad).floor() as i64 + 1)
+    (-floor(pad - a), floor(b + pad) + 1)
 }
 
 impl Rows {

@@ -224,7 +224,7 @@ impl Tree {
 
     /// Number of groups of a level.
     pub(super) fn count(&self, level: usize) -> usize {
-        self.tris.len().div_ceil(WIDE.pow(level as u32))
+        (self.tris.len() + (1 << (3 * level)) - 1) >> (3 * level)
     }
 
     /// The groups of which group `group` of `level` (2 or more) consists.

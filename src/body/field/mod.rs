@@ -19,7 +19,7 @@
 mod build;
 mod plan;
 
-use super::{Distance, spline};
+use super::{Distance, floor, spline};
 use crate::math::Vec3;
 
 pub(in crate::body) use build::{Origin, Source};
@@ -195,7 +195,7 @@ impl Field {
         for level in 0..self.levels.len() {
             let inv = 1.0 / self.levels[level].h;
             let u = [q.x * inv, q.y * inv, q.z * inv];
-            let cell = u.map(|x| x.floor() as i64);
+            let cell = u.map(floor);
             if self.fill(level, cell, &mut c) {
                 continue;
             }
