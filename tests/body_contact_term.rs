@@ -60,7 +60,8 @@ fn case() -> (Cloth, Case) {
         wind: Vec3::zeros(),
         pressure: 0.0,
     };
-    bodies.prepare(&state, 1.0).expect("prepare");
+    let workers = toile::math::parallel::Workers::new(1);
+    bodies.prepare(&state, 1.0, &workers).expect("prepare");
     (cloth, Case { bodies, state, x })
 }
 
@@ -192,5 +193,47 @@ fn wrench_on_a_body_is_the_reaction_of_the_cloth() {
         assert!(expected.0.norm() > 0.1, "{}", term.name());
         assert!((force - expected.0).norm() < 1e-9 * expected.0.norm());
         assert!((torque - expected.1).norm() < 1e-9 * expected.0.norm());
+    }
+}
+
+#[test]
+fn a_long_path_through_a_thin_body_is_refused() {
+    // a plate of 3 cm, crossed by 20 m within one substep, beside it and through it
+    let mut bodies = BodySet::default();
+    let mut values = Vec::new();
+    for i in 0..40 {
+        for j in 0..12 {
+            for k in 0..40 {
+                let p = Vec3::new(
+                    0.01 * f64::from(i) - 0.195,
+                    0.01 * f64::from(j) - 0.055,
+                    0.01 * f64::from(k) - 0.195,
+                );
+                let q = p.abs() - Vec3::new(0.1, 0.015, 0.1);
+                values.push(q.map(|c| c.max(0.0)).norm() + q.max().min(0.0));
+            }
+        }
+    }
+    let body = Body::grid([40, 12, 40], [-0.195, -0.055, -0.195], 0.01, &values).expect("plate");
+    let entry = bodies.add(&body, &ContactSettings::default());
+    let (_, case) = case();
+    let state = State {
+        bodies: vec![entry],
+        ..case.state
+    };
+    let workers = toile::math::parallel::Workers::new(1);
+    bodies.prepare(&state, 1.0, &workers).expect("prepare");
+    let path = |x: f64, y: f64, length: f64| {
+        let from = Vec3::new(x, y, 0.013);
+        (from, from - Vec3::new(0.0, length, 0.0))
+    };
+    for i in 0..2000 {
+        let y = 0.1 + 0.009 * f64::from(i);
+        let (a, b) = path(0.03, y, 20.0);
+        assert!(bodies.passes_through(0, &a, &b, 4e-3), "{y}");
+        let (a, b) = path(0.13, y, 20.0);
+        assert!(!bodies.passes_through(0, &a, &b, 4e-3), "{y}");
+        let (a, b) = path(0.03, y, 0.05);
+        assert!(!bodies.passes_through(0, &a, &b, 4e-3), "{y}");
     }
 }

@@ -509,3 +509,140 @@ fn real_bodies_have_the_sign_of_their_winding_number() {
         assert_eq!(far, 0);
     }
 }
+
+/// Distance of a point to a triangle by its definition: the plane's foot or the nearest of the three
+/// edges' points.
+fn to_triangle(p: &Vec3, t: &[Vec3; 3]) -> f64 {
+    let n = (t[1] - t[0]).cross(&(t[2] - t[0]));
+    let inside = (0..3).all(|k| {
+        let (a, b) = (t[k], t[(k + 1) % 3]);
+        (b - a).cross(&(p - a)).dot(&n) >= 0.0
+    });
+    let plane = if inside && n.norm() > 0.0 {
+        (p - t[0]).dot(&n).abs() / n.norm()
+    } else {
+        f64::INFINITY
+    };
+    (0..3).fold(plane, |best, k| {
+        let (a, e) = (t[k], t[(k + 1) % 3] - t[k]);
+        let s = if e.norm_squared() > 0.0 {
+            ((p - a).dot(&e) / e.norm_squared()).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
+        best.min((p - a - e * s).norm())
+    })
+}
+
+#[test]
+fn distances_agree_with_every_triangle_looked_at() {
+    // slivers, triangles without area, far from the origin, few and many triangles
+    let mut r = Random(21);
+    for (n, m, squeeze, shift) in [
+        (3, 3, 1.0, 0.0),
+        (12, 9, 1.0, 0.0),
+        (40, 23, 1e-3, 0.0),
+        (60, 31, 1.0, 3e4),
+        (25, 14, 1e-9, 2.0),
+    ] {
+        let (mut p, mut t) = torus(0.3, 0.1, n, m);
+        for q in &mut p {
+            q[1] *= squeeze;
+            q[0] += shift;
+        }
+        // a fan around a doubled vertex adds triangles without area
+        let (a, b) = (t[0][0], t[0][1]);
+        let double = p.len() as u32;
+        p.push(p[b as usize]);
+        t.push([a, b, double]);
+        t.push([b, a, double]);
+        let Ok(body) = Body::mesh(&p, &t, 0.03) else {
+            assert!(squeeze < 1e-8, "{n} {m}");
+            continue;
+        };
+        let corners: Vec<[Vec3; 3]> = t
+            .iter()
+            .map(|t| t.map(|v| Vec3::from(p[v as usize])))
+            .collect();
+        for _ in 0..600 {
+            let x = r.point(1.0) * r.next() + Vec3::new(shift, 0.0, 0.0);
+            let brute = corners
+                .iter()
+                .map(|t| to_triangle(&x, t))
+                .fold(f64::INFINITY, f64::min);
+            let got = body.exact_distance(&x).abs();
+            assert!(
+                (got - brute).abs() <= 1e-12 * (1.0 + shift),
+                "{n} {m} at {x:?}: {got} {brute}"
+            );
+        }
+    }
+}
+
+#[test]
+fn real_bodies_deform_to_the_bits_of_a_field_built_anew() {
+    for (name, only) in [
+        ("mean_all.obj", 0.3),
+        ("makehuman_body_closed_m.obj", -9.0),
+        ("makehuman_body_closed_m.obj", 0.55),
+    ] {
+        let Some(path) = data(name) else { return };
+        let body = Body::obj(&path, 1.0, 0.008).unwrap();
+        // an arm, everything, a finger
+        let moved: Vec<Vec3> = body
+            .vertices()
+            .iter()
+            .map(|p| {
+                let w = (p.x - only).clamp(0.0, 0.5);
+                p + Vec3::new(-0.1 * w * w, 0.4 * w, 0.2 * w + 0.1 * w * p.y)
+            })
+            .collect();
+        let one = body.deformed(&moved).unwrap();
+        let two = toile::math::parallel::Workers::new(2);
+        let two = body.deformed_with(&moved, &two).unwrap();
+        let soup: Vec<[f64; 3]> = moved.iter().map(|p| [p.x, p.y, p.z]).collect();
+        let anew = Body::mesh(&soup, body.triangles(), 0.008).unwrap();
+        assert_eq!(one.field_size(), anew.field_size());
+        let mut r = Random(22);
+        let mut changed = 0;
+        for i in 0..60_000 {
+            let x = if i % 2 == 0 {
+                Vec3::new(0.0, 0.9, 0.0) + r.point(1.3)
+            } else {
+                moved[(r.next() * moved.len() as f64) as usize] + r.point(0.05)
+            };
+            let d = anew.distance(&x);
+            assert_eq!(one.distance(&x), d, "{name} {x:?}");
+            assert_eq!(two.distance(&x), d, "{name} {x:?}");
+            changed += usize::from(d != body.distance(&x));
+        }
+        println!("{name}: {changed} of 60000 points changed");
+        assert!(changed > 100);
+    }
+}
+
+#[test]
+fn slopes_of_fields_stay_below_what_paths_are_walked_with() {
+    // system::bodies takes 3
+    let mut bodies = Vec::new();
+    let (p, t) = cube(0.3);
+    bodies.push(Body::mesh(&p, &t, 0.01).unwrap());
+    let (p, t) = torus(0.3, 0.1, 12, 5);
+    bodies.push(Body::mesh(&p, &t, 0.02).unwrap());
+    for name in ["mean_all.obj", "makehuman_body_closed_m.obj"] {
+        let Some(path) = data(name) else { continue };
+        bodies.push(Body::obj(&path, 1.0, 0.01).unwrap());
+    }
+    for body in &bodies {
+        let mut r = Random(23);
+        let v = body.vertices();
+        let mut worst: f64 = 0.0;
+        for i in 0..60_000 {
+            let at = v[(r.next() * v.len() as f64) as usize];
+            let x = at + r.point(if i % 3 == 0 { 0.5 } else { 0.08 });
+            worst = worst.max(body.distance(&x).gradient.norm());
+        }
+        println!("steepest {worst:.3}");
+        assert!(worst < 2.5, "{worst}");
+    }
+}

@@ -5,9 +5,9 @@
 //! as created, never from the last deformation, and every number it takes over is one that it
 //! would compute again: the bits depend on the vertices alone.
 
-use super::bvh::Bvh;
 use super::field::{Field, Origin, Source};
 use super::mesh::{MeshReport, Topology, finite_positions};
+use super::tree::Tree;
 use super::{analytic, sign};
 use crate::error::Result;
 use crate::math::Vec3;
@@ -19,7 +19,7 @@ use std::sync::Arc;
 struct Rest {
     topology: Topology,
     vertices: Arc<Vec<Vec3>>,
-    tree: Arc<Bvh>,
+    tree: Arc<Tree>,
     origin: Origin,
 }
 
@@ -28,7 +28,7 @@ struct Rest {
 pub(super) struct MeshBody {
     rest: Arc<Rest>,
     vertices: Arc<Vec<Vec3>>,
-    tree: Arc<Bvh>,
+    tree: Arc<Tree>,
     pub(super) field: Arc<Field>,
 }
 
@@ -56,7 +56,7 @@ impl MeshBody {
         } else {
             cell
         };
-        let tree = Bvh::new(&vertices, &topology.welded);
+        let tree = Tree::new(&vertices, &topology.welded, workers);
         let source = Source {
             positions: &vertices,
             triangles: &topology.welded,
@@ -82,13 +82,20 @@ impl MeshBody {
     pub(super) fn deformed(&self, vertices: &[Vec3], workers: &Workers) -> Result<Self> {
         let rest = &self.rest;
         rest.topology.check_deformation(vertices)?;
-        let tree = rest.tree.refitted(vertices, &rest.topology.welded);
+        let triangles = &rest.topology.welded;
+        let moved = rest.tree.moved(triangles, &rest.vertices, vertices);
+        let tree = rest.tree.refitted(vertices, triangles, &moved, workers);
+        let created = Source {
+            positions: &rest.vertices,
+            triangles,
+            tree: &rest.tree,
+        };
         let source = Source {
             positions: vertices,
-            triangles: &rest.topology.welded,
+            triangles,
             tree: &tree,
         };
-        let field = rest.origin.updated(&rest.vertices, source, workers)?;
+        let field = rest.origin.updated(created, source, &moved, workers)?;
         Ok(Self {
             rest: Arc::clone(rest),
             vertices: Arc::new(vertices.to_vec()),

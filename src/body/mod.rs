@@ -6,16 +6,19 @@
 //! `spline` for why it is not the trilinear interpolant, and for its error).
 
 mod analytic;
-mod bvh;
+mod bounds;
 mod deform;
 mod field;
 mod grid;
 pub mod mannequin;
 mod mesh;
+mod nearby;
 mod obj;
 mod sign;
 mod spline;
 mod surface_nets;
+mod tree;
+mod triangle;
 
 pub use mesh::MeshReport;
 
@@ -23,6 +26,14 @@ use crate::error::{Error, Result};
 use crate::math::parallel::Workers;
 use crate::math::{Mat3, Rotation, Vec3};
 use std::sync::Arc;
+
+/// Largest whole number not above `x`, without the library call that `f64::floor` is where the
+/// processor's instruction for it may not be used.
+#[inline]
+fn floor(x: f64) -> i64 {
+    let whole = x as i64;
+    whole - i64::from((whole as f64) > x)
+}
 
 /// Positions [m] and triangles of a Wavefront OBJ file, in the file's order; `scale` multiplies its
 /// coordinates. The mesh need not be closed.

@@ -1,6 +1,7 @@
 //! The world around the cloth: bodies and their motion, pins, positions, numbers.
 
 use super::{ContactSettings, Sim, finite, finite_points};
+use std::sync::PoisonError;
 use crate::body::{Body, Pose};
 use crate::error::{Error, Result};
 use crate::math::{Rotation, Vec3};
@@ -83,7 +84,13 @@ impl Sim {
         let state = &mut self.state.bodies[b];
         if !state.moved_with_time {
             // a placement: the deformed field must exist before anything is changed
-            self.bodies[b].0.deformed(&vertices)?;
+            self.bodies[b].0.deformed_with(
+                &vertices,
+                self.engine
+                    .lock()
+                    .unwrap_or_else(PoisonError::into_inner)
+                    .workers(),
+            )?;
             state.vertices.clone_from(&vertices);
             state.target_vertices.clear();
         } else {

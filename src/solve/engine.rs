@@ -122,7 +122,7 @@ impl Engine {
     ) -> Result<Attempt> {
         let n = state.positions.len();
         let system = &mut self.system;
-        system.bodies.prepare(state, fraction)?;
+        system.bodies.prepare(state, fraction, &self.workers)?;
         self.start.copy_from_slice(&state.positions);
         let dynamic = motion == Motion::Dynamic;
         let inv_dt = if dynamic { 1.0 / h } else { 0.0 };
@@ -309,7 +309,7 @@ impl Engine {
             body.target = body.pose;
             body.target_vertices.clear();
         }
-        self.system.bodies.prepare(&still, 1.0)?;
+        self.system.bodies.prepare(&still, 1.0, &self.workers)?;
         let bodies = self.system.bodies.clone();
         let world = World {
             gravity: state.gravity,

@@ -5,6 +5,15 @@ use super::term::{Bodies, ContactSettings};
 use crate::body::{Body, Distance, Pose};
 use crate::error::{Error, Result};
 use crate::math::Vec3;
+use crate::math::parallel::Workers;
+
+/// Bound of a distance field's slope. Exact distances have 1; the spline through their samples
+/// overshoots where they have a kink, to 2 between the fingers of a hand sampled too coarsely.
+const SLOPE: f64 = 3.0;
+/// Part of the depth that a path may dip below it unseen.
+const BLUR: f64 = 0.05;
+/// Most evaluations along one path.
+const MAX_STRIDES: usize = 4096;
 
 /// A body in the world, with what the next substep does to it.
 #[derive(Clone, Debug)]
@@ -15,6 +24,8 @@ struct Entry {
     end: Body,
     start_vertices: Vec<Vec3>,
     end_vertices: Vec<Vec3>,
+    /// Largest way of a vertex over the substep, in the body's frame [m].
+    way: f64,
     from: Pose,
     to: Pose,
 }
@@ -35,6 +46,7 @@ impl BodySet {
             end: body.clone(),
             start_vertices: Vec::new(),
             end_vertices: Vec::new(),
+            way: 0.0,
             from: Pose::default(),
             to: Pose::default(),
         });
@@ -68,12 +80,12 @@ impl BodySet {
     }
 
     /// Prepares the substep that covers `fraction` of what is left of the host's step.
-    pub fn prepare(&mut self, state: &State, fraction: f64) -> Result<()> {
+    pub fn prepare(&mut self, state: &State, fraction: f64, workers: &Workers) -> Result<()> {
         for (b, (entry, body)) in self.entries.iter_mut().zip(&state.bodies).enumerate() {
             entry.from = body.pose;
             entry.to = body.pose.toward(&body.target, fraction);
             if entry.start_vertices != body.vertices {
-                entry.start = shaped(&entry.original, &body.vertices)
+                entry.start = shaped(&entry.original, &body.vertices, workers)
                     .map_err(|e| e.at(format!("body {b}")))?;
                 entry.start_vertices.clone_from(&body.vertices);
             }
@@ -87,10 +99,16 @@ impl BodySet {
                 entry.end = if end == entry.start_vertices {
                     entry.start.clone()
                 } else {
-                    shaped(&entry.original, &end).map_err(|e| e.at(format!("body {b}")))?
+                    shaped(&entry.original, &end, workers).map_err(|e| e.at(format!("body {b}")))?
                 };
                 entry.end_vertices = end;
             }
+            entry.way = if entry.start_vertices == entry.end_vertices {
+                0.0
+            } else {
+                let ways = entry.start.vertices().iter().zip(entry.end.vertices());
+                ways.map(|(a, b)| (b - a).norm()).fold(0.0, f64::max)
+            };
         }
         Ok(())
     }
@@ -102,6 +120,7 @@ impl BodySet {
             if entry.start_vertices != entry.end_vertices {
                 entry.start = entry.end.clone();
                 entry.start_vertices.clone_from(&entry.end_vertices);
+                entry.way = 0.0;
                 body.vertices.clone_from(&entry.end_vertices);
             }
             if body.vertices == body.target_vertices {
@@ -127,26 +146,55 @@ impl BodySet {
         entry.start.value(&entry.from.to_body(point))
     }
 
-    /// Whether the straight path of a point over the substep, seen from the body, comes deeper
-    /// than `depth` below the surface although its end does not: the point would have passed
-    /// through a thin part of the body.
+    /// Whether the straight path of a point over the substep, seen from the body that moves and
+    /// deforms, comes deeper than `depth` below the surface although its end does not: the point
+    /// would have passed through a thin part of the body. A point that is too deep to begin with
+    /// may leave.
     pub fn passes_through(&self, body: usize, x0: &Vec3, x: &Vec3, depth: f64) -> bool {
         let entry = &self.entries[body];
-        let (p, q) = (entry.from.to_body(x0), entry.to.to_body(x));
-        let length = (q - p).norm();
+        let q = entry.to.to_body(x);
         let end = entry.end.value(&q);
-        let mut s = 0.0;
-        // the field is 1-Lipschitz: from a point at distance d the next |d| of the path is clear
-        while s < length {
-            let d = entry.end.value(&p.lerp(&q, s / length));
-            if d < -depth && end > d + depth {
-                return true;
-            }
-            // however long the path, it is marched in a bounded number of strides
-            s += d.abs().max(0.5 * depth).max(1e-5).max(1e-4 * length);
+        // too short a path to come that deep
+        let longest = (q - entry.from.to_body(x0)).norm() + entry.way;
+        if end - SLOPE * longest >= -depth {
+            return false;
         }
-        false
+        // the start rides along with the surface that it stood at
+        let p = entry.to.to_body(&self.carried(body, x0));
+        let length = (q - p).norm();
+        dips(
+            |s| entry.end.value(&p.lerp(&q, s / length)),
+            length,
+            end,
+            depth,
+        )
     }
+}
+
+/// Whether a path of some length through a distance field (`value(s)` after a way `s`, `end` after
+/// all of it) dips below `-depth` and by `depth` below its end, and if it starts below, below that.
+///
+/// From a point `d` above the level in question the next `d / SLOPE` of the path are clear (sphere
+/// tracing, Hart 1996), whatever the path's length and the body's thickness. Close above the level
+/// strides do not fall below what a dip of `BLUR depth` takes. A path that keeps so close to the
+/// level that the strides run out counts as passing: the caller then cuts the path.
+fn dips(value: impl Fn(f64) -> f64, length: f64, end: f64, depth: f64) -> bool {
+    let stride = (2.0 * BLUR * depth / SLOPE).max(1e-6);
+    let mut level = (-depth).min(end - depth);
+    let mut s = 0.0;
+    for _ in 0..MAX_STRIDES {
+        if s >= length {
+            return false;
+        }
+        let d = value(s);
+        if s == 0.0 && d < level {
+            level = d - depth;
+        } else if d < level {
+            return true;
+        }
+        s += ((d - level) / SLOPE).max(stride);
+    }
+    s < length
 }
 
 impl Bodies for BodySet {
@@ -190,11 +238,11 @@ impl Bodies for BodySet {
     }
 }
 
-fn shaped(original: &Body, vertices: &[Vec3]) -> Result<Body> {
+fn shaped(original: &Body, vertices: &[Vec3], workers: &Workers) -> Result<Body> {
     if vertices.is_empty() {
         Ok(original.clone())
     } else {
-        original.deformed(vertices)
+        original.deformed_with(vertices, workers)
     }
 }
 
@@ -226,5 +274,64 @@ pub fn check_index(body: u32, count: usize) -> Result<usize> {
         Err(Error::argument(format!(
             "body {body} does not exist; there are {count}"
         )))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A plate of half thickness `half` around `at`, met head on.
+    fn plate(at: f64, half: f64) -> impl Fn(f64) -> f64 {
+        move |s| (s - at).abs() - half
+    }
+
+    #[test]
+    fn a_thin_plate_is_seen_from_any_distance() {
+        let depth = 1e-3;
+        for length in [0.05, 1.0, 8.0, 100.0, 1e4] {
+            for part in [0.1, 0.377, 0.5, 0.9] {
+                let at = part * length;
+                let value = plate(at, 1.2 * depth);
+                assert!(
+                    dips(&value, length, value(length), depth),
+                    "{length} {part}"
+                );
+                // one too thin to be that deep inside is not
+                let value = plate(at, 0.9 * depth);
+                assert!(
+                    !dips(&value, length, value(length), depth),
+                    "{length} {part}"
+                );
+                // nor one that the path does not reach
+                let value = plate(1.1 * length, 1.2 * depth);
+                assert!(
+                    !dips(&value, length, value(length), depth),
+                    "{length} {part}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_point_that_starts_too_deep_may_leave() {
+        let depth = 1e-3;
+        let value = |s: f64| s - 0.02;
+        assert!(!dips(value, 0.05, value(0.05), depth));
+        // but not through the other side
+        let value = |s: f64| (s - 0.02).abs() - 0.03;
+        assert!(dips(value, 0.1, value(0.1), depth));
+    }
+
+    #[test]
+    fn the_number_of_evaluations_is_bounded_and_the_doubtful_path_is_refused() {
+        let depth = 1e-3;
+        let count = std::cell::Cell::new(0);
+        let level = |_: f64| {
+            count.set(count.get() + 1);
+            -depth * (1.0 - 1e-9)
+        };
+        assert!(dips(level, 1e6, 0.5, depth));
+        assert_eq!(count.get(), MAX_STRIDES);
     }
 }
