@@ -55,7 +55,7 @@ fn error(body: &Body) -> (f64, f64) {
     let h = body.cell_size().unwrap();
     let (v, t) = (body.vertices(), body.triangles());
     let mut seed = 1;
-    let (mut sum, mut worst, count) = (0.0, 0.0f64, 50);
+    let (mut sum, mut worst, count) = (0.0, 0.0f64, 500);
     for _ in 0..count {
         let tri = t[(random(&mut seed) * t.len() as f64) as usize].map(|i| v[i as usize]);
         let center = (tri[0] + tri[1] + tri[2]) / 3.0;

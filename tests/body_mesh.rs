@@ -584,7 +584,7 @@ fn real_bodies_deform_to_the_bits_of_a_field_built_anew() {
     for (name, only) in [
         ("mean_all.obj", 0.3),
         ("makehuman_body_closed_m.obj", -9.0),
-        ("makehuman_body_closed_m.obj", 0.55),
+        ("makehuman_body_closed_m.obj", 0.42),
     ] {
         let Some(path) = data(name) else { return };
         let body = Body::obj(&path, 1.0, 0.008).unwrap();
@@ -645,4 +645,107 @@ fn slopes_of_fields_stay_below_what_paths_are_walked_with() {
         println!("steepest {worst:.3}");
         assert!(worst < 2.5, "{worst}");
     }
+}
+
+/// Depths that a field finds at given points.
+fn depths(body: &Body, at: &[Vec3], scale: f64) -> Vec<f64> {
+    at.iter()
+        .map(|x| body.value(&(x * scale)) / scale)
+        .collect()
+}
+
+#[test]
+fn a_damaged_real_body_is_mended_or_refused_with_its_place() {
+    let Some(path) = data("makehuman_body_closed_m.obj") else {
+        return;
+    };
+    let (p, t) = toile::body::read_obj(&path, 1.0).unwrap();
+    let p: Vec<[f64; 3]> = p.iter().map(|p| [p.x, p.y, p.z]).collect();
+    let n = p.len() as u32;
+    let whole = Body::mesh(&p, &t, 0.01).unwrap();
+    let mut r = Random(31);
+    let at: Vec<Vec3> = (0..400)
+        .map(|_| Vec3::from(p[(r.next() * p.len() as f64) as usize]) + r.point(0.03))
+        .collect();
+    let reference = depths(&whole, &at, 1.0);
+    let agree = |name: &str, body: &Body, scale: f64, tolerance: f64| {
+        for (x, (a, b)) in at
+            .iter()
+            .zip(depths(body, &at, scale).iter().zip(&reference))
+        {
+            assert!((a - b).abs() < tolerance, "{name} at {x:?}: {a} {b}");
+        }
+    };
+    // centimetres, millimetres, kilometres
+    for scale in [100.0, 1000.0, 1e-3] {
+        let q: Vec<_> = p.iter().map(|p| p.map(|c| c * scale)).collect();
+        agree(
+            "scaled",
+            &Body::mesh(&q, &t, 0.01 * scale).unwrap(),
+            scale,
+            1e-4,
+        );
+    }
+    let inward: Vec<_> = t.iter().map(|t| [t[0], t[2], t[1]]).collect();
+    let body = Body::mesh(&p, &inward, 0.01).unwrap();
+    assert!(body.mesh_report().unwrap().flipped);
+    agree("inward", &body, 1.0, 1e-12);
+    // every triangle with corners of its own, as exporters write texture seams
+    let own: Vec<_> = t.iter().flatten().map(|&v| p[v as usize]).collect();
+    let soup: Vec<[u32; 3]> = (0..t.len() as u32)
+        .map(|t| [3 * t, 3 * t + 1, 3 * t + 2])
+        .collect();
+    let body = Body::mesh(&own, &soup, 0.01).unwrap();
+    assert_eq!(body.mesh_report().unwrap().euler(), 2);
+    agree("soup", &body, 1.0, 1e-12);
+    // vertices of no triangle, triangles without area, triangles back to back
+    let mut q = p.clone();
+    q.extend([[0.0, 50.0, 0.0]; 3]);
+    agree("loose", &Body::mesh(&q, &t, 0.01).unwrap(), 1.0, 1e-12);
+    let mut back = t.clone();
+    back.push(t[77]);
+    back.push([t[77][0], t[77][2], t[77][1]]);
+    agree(
+        "back to back",
+        &Body::mesh(&p, &back, 0.01).unwrap(),
+        1.0,
+        1e-9,
+    );
+    let mut collapsed = p.clone();
+    for t in t.iter().step_by(70) {
+        collapsed[t[1] as usize] = collapsed[t[0] as usize];
+    }
+    let body = Body::mesh(&collapsed, &t, 0.01).unwrap();
+    assert!(body.mesh_report().unwrap().welded > 100);
+    agree("collapsed", &body, 1.0, 0.01);
+    // what cannot be mended names a place
+    let text = |p: &[[f64; 3]], t: &[[u32; 3]]| Body::mesh(p, t, 0.01).unwrap_err().message;
+    let hole = text(&p, &[&t[..500], &t[503..]].concat());
+    assert!(hole.contains("open edges and 0 edges"), "{hole}");
+    assert!(
+        hole.contains("for example edge") && !hole.contains("same coordinates"),
+        "{hole}"
+    );
+    let mut one = t.clone();
+    one[500].swap(0, 1);
+    let one = text(&p, &one);
+    assert!(
+        one.contains("3 edges whose triangles run") && one.contains("triangle 500"),
+        "{one}"
+    );
+    let rounded: Vec<_> = own.iter().map(|p| p.map(|c| c + 1e-9 * r.next())).collect();
+    let rounded = text(&rounded, &soup);
+    assert!(
+        rounded.contains("must have the same coordinates"),
+        "{rounded}"
+    );
+    let mut pair = p.clone();
+    pair.extend(p.iter().map(|p| [p[0] + 2.0, p[1], p[2]]));
+    let mut both = t.clone();
+    both.extend(inward.iter().map(|t| t.map(|v| v + n)));
+    let pair = text(&pair, &both);
+    assert!(
+        pair.contains("1 parts are turned outward and 1 inward") && pair.contains("26756"),
+        "{pair}"
+    );
 }

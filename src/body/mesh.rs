@@ -120,7 +120,9 @@ impl Topology {
         let size = extent(positions, &welded);
         if volume.is_nan() || volume.abs() <= 1e-9 * size * size * size {
             return Err(Error::geometry(format!(
-                "the mesh encloses {volume} m^3 within an extent of {size} m; a body needs volume"
+                "the mesh encloses {volume} m^3 within an extent of {size} m; a body needs \
+                 volume{}",
+                edges.turned_part(positions, &welded)
             )));
         }
         let flipped = volume < 0.0;
@@ -299,26 +301,72 @@ impl Edges {
             return Ok(());
         };
         let m = (positions[a as usize] + positions[b as usize]) * 0.5;
+        // seams whose two sides were rounded differently
+        let p = positions[a as usize];
+        let near = (0..positions.len())
+            .filter(|&v| v != a as usize && positions[v] != p)
+            .map(|v| ((positions[v] - p).norm(), v))
+            .min_by(|s, t| s.0.total_cmp(&t.0));
+        let length = (positions[b as usize] - p).norm();
+        let hint = match near {
+            Some((gap, v)) if open > 0 && gap < 1e-2 * length => format!(
+                "; vertex {v} is {gap:.3e} m from vertex {a}: vertices that are one point must \
+                 have the same coordinates"
+            ),
+            _ => String::new(),
+        };
         Err(Error::geometry(format!(
             "the mesh is not closed: {open} open edges and {turned} edges whose triangles run the \
              same way, limit 0; for example edge ({a}, {b}) of triangle {t} at ({:.6}, {:.6}, \
-             {:.6}) m",
+             {:.6}) m{hint}",
             m.x, m.y, m.z
         )))
+    }
+
+    /// Triangles that hang together by edges.
+    fn parts(&self, count: usize) -> Union {
+        let mut parts = Union::new(count);
+        for group in self.sides.chunk_by(|s, t| (s.0, s.1) == (t.0, t.1)) {
+            for pair in group.windows(2) {
+                parts.join(pair[0].2 as usize, pair[1].2 as usize);
+            }
+        }
+        parts
+    }
+
+    /// Names a part that is turned inward beside others that are not, for messages.
+    fn turned_part(&self, positions: &[Vec3], triangles: &[[u32; 3]]) -> String {
+        let mut parts = self.parts(triangles.len());
+        let mut volumes = vec![0.0; triangles.len()];
+        for (t, tri) in triangles.iter().enumerate() {
+            let root = parts.root(t);
+            let o = positions[triangles[root][0] as usize];
+            let [a, b, c] = tri.map(|v| positions[v as usize] - o);
+            volumes[root] += a.dot(&b.cross(&c)) / 6.0;
+        }
+        let positive = volumes.iter().filter(|&&v| v > 0.0).count();
+        let negative = volumes.iter().filter(|&&v| v < 0.0).count();
+        match volumes.iter().position(|&v| v < 0.0) {
+            Some(t) if positive > 0 => format!(
+                "; {positive} parts are turned outward and {negative} inward, for example that of \
+                 triangle {t} with {} m^3",
+                volumes[t]
+            ),
+            _ => String::new(),
+        }
     }
 
     /// Pinched vertices, components, used vertices.
     fn fans(&self, triangles: &[[u32; 3]], vertices: usize) -> (usize, usize, usize) {
         // corners are joined when an edge at their vertex joins their triangles
         let mut corners = Union::new(3 * triangles.len());
-        let mut parts = Union::new(triangles.len());
+        let mut parts = self.parts(triangles.len());
         let corner = |t: u32, v: u32| {
             let tri = &triangles[t as usize];
             3 * t as usize + tri.iter().position(|&w| w == v).unwrap_or(0)
         };
         for group in self.sides.chunk_by(|s, t| (s.0, s.1) == (t.0, t.1)) {
             for pair in group.windows(2) {
-                parts.join(pair[0].2 as usize, pair[1].2 as usize);
                 for v in [pair[0].0, pair[0].1] {
                     corners.join(corner(pair[0].2, v), corner(pair[1].2, v));
                 }

@@ -1,8 +1,9 @@
 //! Wavefront OBJ: positions and faces, nothing else.
 //!
-//! Read here instead of with a general importer for two reasons: a deforming body's host sends new
-//! vertices in the order of its file, and importers reorder and drop vertices; and an error should
-//! name its line. Understood: `v x y z [w...]`, `f i[/..][/..] ...` with positive or negative
+//! Read here instead of with a general importer: a deforming body's host sends new vertices in the
+//! order of its file, and `tobj` numbers them anew per object and drops those of no face; it reads
+//! coordinates as f32 and cuts polygons into fans, which fold at a notch; and an error should name
+//! its line. Understood: `v x y z [w...]`, `f i[/..][/..] ...` with positive or negative
 //! numbers, `\` at the end of a line, comments; all other statements are skipped. Polygons are cut
 //! into triangles by clipping ears in the plane of their Newell normal.
 

@@ -28,6 +28,7 @@ impl Tri {
     /// Barycentric weights of `b` and `c` at the point of the triangle nearest to `p`.
     #[inline]
     pub(super) fn closest(&self, p: &Vec3) -> (f64, f64) {
+        // an edge without length is never the nearest feature: its ends or the next edge are
         let ap = p - self.a;
         let (ab, ac) = (&self.ab, &self.ac);
         let d1 = ab.dot(&ap);
@@ -41,7 +42,7 @@ impl Tri {
             return (1.0, 0.0);
         }
         let vc = d1 * d4 - d3 * d2;
-        if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 && d1 > d3 {
             return (d1 / (d1 - d3), 0.0);
         }
         let (d5, d6) = (d1 - bc, d2 - cc);
@@ -49,11 +50,11 @@ impl Tri {
             return (0.0, 1.0);
         }
         let vb = d5 * d2 - d1 * d6;
-        if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 && d2 > d6 {
             return (0.0, d2 / (d2 - d6));
         }
         let va = d3 * d6 - d5 * d4;
-        if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
+        if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 && (d4 - d3) + (d5 - d6) > 0.0 {
             let w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
             return (1.0 - w, w);
         }
@@ -108,5 +109,41 @@ impl Tri {
         let volume = |x: &Vec3, y: &Vec3| d.dot(&(x - p).cross(&(y - p)));
         let (u, v, w) = (volume(&self.a, &b), volume(&b, &c), volume(&c, &self.a));
         (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn triangles_without_area_have_distances() {
+        // every way in which corners and edges can coincide
+        let (a, b) = (Vec3::new(0.1, 0.2, 0.3), Vec3::new(0.4, -0.1, 0.7));
+        let m = a.lerp(&b, 0.25);
+        for t in [
+            [a, a, a],
+            [a, a, b],
+            [a, b, a],
+            [b, a, a],
+            [a, b, m],
+            [m, a, b],
+            [b, m, a],
+        ] {
+            let tri = Tri::new(0, t);
+            let last = if t == [a, a, a] { a } else { b };
+            for i in 0..1000 {
+                let p = Vec3::from_fn(|d, _| f64::from(i / 10i32.pow(d as u32) % 10) / 5.0 - 0.9);
+                let e = last - a;
+                let s = if e.norm() > 0.0 {
+                    ((p - a).dot(&e) / e.norm_squared()).clamp(0.0, 1.0)
+                } else {
+                    0.0
+                };
+                let want = (p - a - e * s).norm();
+                let got = tri.distance2(&p).sqrt();
+                assert!((got - want).abs() < 1e-7, "{t:?} {p:?}: {got} {want}");
+            }
+        }
     }
 }

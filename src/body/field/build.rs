@@ -310,7 +310,7 @@ fn finish(
                 let slot = chunk * 256 + i;
                 let beside = |f: usize| {
                     let mut b = level.bricks[slot];
-                    b[f / 2] += if f % 2 == 0 { -1 } else { 1 };
+                    b[f / 2] += if f & 1 == 0 { -1 } else { 1 };
                     b
                 };
                 let around: [u32; 6] = std::array::from_fn(|f| level.slot(beside(f)));
