@@ -1,12 +1,12 @@
 //! The world around the cloth: bodies and their motion, pins, positions, numbers.
 
 use super::{ContactSettings, Sim, finite, finite_points};
-use std::sync::PoisonError;
 use crate::body::{Body, Pose};
 use crate::error::{Error, Result};
 use crate::math::{Rotation, Vec3};
 use crate::system::bodies::check_index;
 use crate::system::state::{Pin, State};
+use std::sync::PoisonError;
 
 impl Sim {
     /// Puts a body into the world at the identity pose; returns its number.
