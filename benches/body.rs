@@ -68,6 +68,9 @@ fn error(body: &Body) -> (f64, f64) {
     (sum / f64::from(count), worst)
 }
 
+/// Vertices of a frame.
+type Shape<'a> = &'a dyn Fn(usize) -> Vec<Vec3>;
+
 fn row(name: &str, positions: &[Vec3], triangles: &[[u32; 3]], cell: f64, repeats: usize) {
     let soup: Vec<[f64; 3]> = positions.iter().map(|p| (*p).into()).collect();
     let body = Body::mesh(&soup, triangles, cell).expect("body");
@@ -115,8 +118,7 @@ fn row(name: &str, positions: &[Vec3], triangles: &[[u32; 3]], cell: f64, repeat
             Body::mesh_with(&soup, triangles, cell, &workers)
         });
         let mut parts = vec![format!("build {:.3} ({:.3})", build.0, build.1)];
-        let kinds: [(&str, &dyn Fn(usize) -> Vec<Vec3>); 3] =
-            [("all", &all), ("arm", &arm), ("spot", &spot)];
+        let kinds: [(&str, Shape<'_>); 3] = [("all", &all), ("arm", &arm), ("spot", &spot)];
         for (kind, shape) in kinds {
             let frames: Vec<Vec<Vec3>> = (0..repeats).map(shape).collect();
             let t = time(repeats, |i| {
