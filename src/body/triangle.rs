@@ -13,23 +13,36 @@ pub(super) struct Tri {
     pub(super) ac: Vec3,
     /// Number in the mesh.
     pub(super) id: u32,
+    /// No wider than 1e-10 of its length: its edges stand for it, since the signs by which the
+    /// nearest feature is found would be those of rounding errors.
+    flat: bool,
 }
 
 impl Tri {
     pub(super) fn new(id: u32, [a, b, c]: [Vec3; 3]) -> Self {
+        let (ab, ac, bc) = (b - a, c - a, c - b);
+        let longest = ab
+            .norm_squared()
+            .max(ac.norm_squared())
+            .max(bc.norm_squared());
+        // written so that lengths whose squares vanish count as flat too
+        let wide = ab.cross(&ac).norm() > 1e-10 * longest;
         Self {
             a,
-            ab: b - a,
-            ac: c - a,
+            ab,
+            ac,
             id,
+            flat: !wide,
         }
     }
 
     /// Barycentric weights of `b` and `c` at the point of the triangle nearest to `p`.
     #[inline]
     pub(super) fn closest(&self, p: &Vec3) -> (f64, f64) {
-        // an edge without length is never the nearest feature: its ends or the next edge are
         let ap = p - self.a;
+        if self.flat {
+            return self.closest_edge(&ap);
+        }
         let (ab, ac) = (&self.ab, &self.ac);
         let d1 = ab.dot(&ap);
         let d2 = ac.dot(&ap);
@@ -42,7 +55,7 @@ impl Tri {
             return (1.0, 0.0);
         }
         let vc = d1 * d4 - d3 * d2;
-        if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 && d1 > d3 {
+        if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
             return (d1 / (d1 - d3), 0.0);
         }
         let (d5, d6) = (d1 - bc, d2 - cc);
@@ -50,11 +63,11 @@ impl Tri {
             return (0.0, 1.0);
         }
         let vb = d5 * d2 - d1 * d6;
-        if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 && d2 > d6 {
+        if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
             return (0.0, d2 / (d2 - d6));
         }
         let va = d3 * d6 - d5 * d4;
-        if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 && (d4 - d3) + (d5 - d6) > 0.0 {
+        if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
             let w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
             return (1.0 - w, w);
         }
