@@ -1,6 +1,6 @@
 //! Which linear solver.
 //!
-//! Newton's directions are wanted to a relative residual of 1e-2. With `rho` the stiffness of a vertex
+//! Newton's directions are wanted to a relative residual of 1e-3 to 1e-2. With `rho` the stiffness of a vertex
 //! over its mass by the squared step, measured on cloth in motion and in drapes:
 //!
 //! * small `rho` (time steps): conjugate gradients with IC(0) take 10 to 30 iterations; a new
@@ -8,9 +8,11 @@
 //! * large `rho` (statics): their number grows without bound, while the complete factor of an earlier
 //!   matrix keeps it below 15.
 //!
-//! On a sheet of 1 600 vertices falling over a sphere with steps of 10 ms (`rho` = 2 400) IC(0) took
-//! 4.0 s and kept factors 5.5 s, on 10 000 vertices (`rho` = 12 000) both the same; in the relaxation
-//! of a shirt of 9 600 vertices (`rho` above 1e5 for most steps) 102 s and 57 s.
+//! CPU seconds on a machine with other work, so only their ratios count: a sheet of 1 600 vertices
+//! falling over a sphere for 1 s with steps of 10 ms (`rho` about 2 400), IC(0) to 1e-2 4.0 and kept
+//! factors to 3e-2 5.5; 10 000 vertices for 0.25 s (`rho` about 12 000), both to 1e-2, 9.8 and 10.7;
+//! the drape of a shirt of 9 600 vertices to 1e-2 102 (two coarse levels) and 57 (one). The place of
+//! the crossover between these is an estimate.
 //!
 //! `rho` is read off the matrix: internal stiffness has zero row sums, so what a row's blocks sum
 //! to is its mass term, and `rho` is the median over vertices of trace(diagonal block) over
