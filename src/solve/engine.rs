@@ -8,6 +8,7 @@ use crate::error::Result;
 use crate::math::Vec3;
 use crate::math::parallel::Workers;
 use crate::system::assemble::{Assembler, energy};
+use crate::system::bodies::SLOPE;
 use crate::system::build::System;
 use crate::system::state::State;
 use crate::system::term::{Bodies, Configuration, World};
@@ -364,9 +365,9 @@ fn inadmissible(system: &System, at: &Configuration<'_>, dynamic: bool) -> Optio
     for b in 0..bodies.count() {
         let limit = system.depth_limit(b);
         for (x0, x1) in start.iter().zip(x) {
-            // the signed distance changes at most as fast as its argument
+            // what the distance cannot have fallen by on this path is clear
             let room = bodies.value_at_start(b, x0) + limit;
-            if room > bodies.travel(b, x0, x1) {
+            if room > SLOPE * bodies.travel(b, x0, x1) {
                 continue;
             }
             if room > 0.0 && bodies.value(b, x1) < -limit {

@@ -9,7 +9,7 @@ use crate::math::parallel::Workers;
 
 /// Bound of a distance field's slope. Exact distances have 1; the spline through their samples
 /// overshoots where they have a kink, to 2 between the fingers of a hand sampled too coarsely.
-const SLOPE: f64 = 3.0;
+pub const SLOPE: f64 = 3.0;
 /// Part of the depth that a path may dip below it unseen.
 const BLUR: f64 = 0.05;
 /// Most evaluations along one path.
