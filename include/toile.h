@@ -455,7 +455,7 @@ typedef struct toile_progress {
      */
     double fraction;
     /**
-     * Name of the stage, UTF-8, valid during the callback: "sew", "settle", "refine", "rest".
+     * Name of the stage, UTF-8, valid during the callback: "sew", "settle", "unfold", "rest".
      */
     const char *stage;
     /**

@@ -50,7 +50,7 @@ pub struct DrapeOptions {
 pub struct Progress {
     /// Estimate of the part done, 0 to 1, never decreasing.
     pub fraction: f64,
-    /// Stage name: "sew", "settle", "refine", "rest", "step".
+    /// Stage name: "sew", "settle", "unfold", "rest".
     pub stage: &'static str,
     /// Present residual [N].
     pub residual: f64,

@@ -1,10 +1,11 @@
 //! Laws that the whole simulator must keep: friction, energy, momentum, order in the time step,
 //! statics, and the same bits whatever the number of threads or the way to a state.
 
+use crate::sheets::Random;
 use toile::body::Body;
 use toile::math::Vec3;
-use toile::pattern::Fabric;
-use toile::sim::{ContactSettings, DrapeOptions, Settings, Sim, SimOptions};
+use toile::pattern::{BendingModel, Fabric};
+use toile::sim::{ContactSettings, DrapeOptions, Outcome, Settings, Sim, SimOptions};
 use toile::tri::grid::{SheetPattern, sheet_garment, structured_sheet};
 
 const G: f64 = 9.81;
@@ -50,6 +51,58 @@ fn furthest(a: &[Vec3], b: &[Vec3]) -> f64 {
         .zip(b)
         .map(|(p, q)| (p - q).norm())
         .fold(0.0, f64::max)
+}
+
+/// Umetani et al. 2011, Fig. 6, in small; `cargo bench --bench umetani` is the whole of it.
+#[test]
+fn a_tangle_unfolds_to_the_drape_of_the_flat_sheet() {
+    for (n, bending) in [(16, 1e-5), (12, 1e-3)] {
+        let hung = || {
+            let fabric = Fabric {
+                bending_warp: bending,
+                bending_weft: bending,
+                bending_model: BendingModel::Quadratic,
+                ..Fabric::default()
+            };
+            let mut sim = sheet(1.0, n, fabric, [0.0, -G, 0.0], default_tolerance());
+            let last = ((n + 1) * (n + 1) - 1) as u32;
+            sim.pin(&[last - n as u32, last], None).unwrap();
+            sim
+        };
+        let options = DrapeOptions {
+            force_tolerance: 0.0,
+            max_steps: 0,
+        };
+        let want = hung().drape(&options, &mut |_| true).unwrap();
+        for seed in 1..=3 {
+            let mut sim = hung();
+            let mut random = Random::new(seed);
+            let corner = sim.positions()[0];
+            let mut positions: Vec<[f64; 3]> = sim
+                .positions()
+                .iter()
+                .map(|_| (corner + random.vec3(1.0)).into())
+                .collect();
+            for pin in [(n + 1) * (n + 1) - 1 - n, (n + 1) * (n + 1) - 1] {
+                positions[pin] = sim.positions()[pin].into();
+            }
+            sim.set_positions(&positions, None).unwrap();
+            let mut fraction = 0.0;
+            let got = sim
+                .drape(&options, &mut |p| {
+                    assert!(p.fraction >= fraction);
+                    fraction = p.fraction;
+                    true
+                })
+                .unwrap();
+            println!(
+                "{n} x {n}, {bending} N m, seed {seed}: {} iterations, {:.6} J of {:.6} J",
+                got.newton_iterations, got.potential_energy, want.potential_energy
+            );
+            assert_eq!(got.outcome, Outcome::Converged);
+            assert!((got.potential_energy / want.potential_energy - 1.0).abs() < 0.01);
+        }
+    }
 }
 
 /// A patch at rest on a plane whose weight is then tilted by an angle of the given tangent:

@@ -203,7 +203,7 @@ fn cantilever(pattern: Pattern, model: BendingModel, gamma: f64, n: usize, m: us
     let weight = gamma * RIGIDITY / LENGTH.powi(3);
     let world = still(weight / garment.fabrics[0].density);
     let mut terms = bending(&cloth);
-    terms.push(Box::new(Membrane::new(&cloth)));
+    terms.push(Box::new(Membrane::new(&cloth, 1.0)));
     terms.push(Box::new(Gravity::new(&cloth)));
     // start from the continuous solution, to spare iterations; the end is the mesh's own
     let fine = curve(&elastica(gamma, 4000));

@@ -59,7 +59,7 @@ fn uniform_strain_is_exact_on_every_mesh() {
             .zip(&fixed)
             .map(|(p, f)| if *f { *p } else { p + random.vec3(1e-3) })
             .collect();
-        let terms: Vec<Box<dyn Term>> = vec![Box::new(Membrane::new(&cloth))];
+        let terms: Vec<Box<dyn Term>> = vec![Box::new(Membrane::new(&cloth, 1.0))];
         let still = world(Vec3::zeros());
         let out = crate::sheets::statics::relax(&terms, &mut x, &fixed, &still, 1e-11, 100);
         assert!(out.residual < 1e-11, "{pattern:?}: {}", out.residual);
@@ -68,7 +68,7 @@ fn uniform_strain_is_exact_on_every_mesh() {
             .zip(&exact)
             .map(|(a, b)| (a - b).norm())
             .fold(0.0, f64::max);
-        let membrane = Membrane::new(&cloth);
+        let membrane = Membrane::new(&cloth, 1.0);
         let stress = (0..cloth.areas.len())
             .map(|t| (membrane.stress(t, &x) - want).norm() / want.norm())
             .fold(0.0, f64::max);
@@ -109,7 +109,7 @@ fn a_hanging_sheet_stretches_by_its_weight() {
         let errors = [8, 16, 32].map(|n| {
             let cloth = crate::sheets::sheet(pattern, l, w, n, fabric.clone());
             let terms: Vec<Box<dyn Term>> = vec![
-                Box::new(Membrane::new(&cloth)),
+                Box::new(Membrane::new(&cloth, 1.0)),
                 Box::new(Gravity::new(&cloth)),
             ];
             // a slight stretch keeps every triangle in tension from the first iteration on

@@ -187,7 +187,7 @@ pub struct toile_progress {
     pub struct_size: usize,
     /// Estimate of the part done, 0 to 1, never decreasing.
     pub fraction: f64,
-    /// Name of the stage, UTF-8, valid during the callback: "sew", "settle", "refine", "rest".
+    /// Name of the stage, UTF-8, valid during the callback: "sew", "settle", "unfold", "rest".
     pub stage: *const c_char,
     /// Largest force on a free vertex now [N].
     pub residual: f64,

@@ -57,6 +57,22 @@ impl Cloth {
         Ok(cloth)
     }
 
+    /// Rest area of the whole cloth [m^2].
+    pub fn area(&self) -> f64 {
+        self.areas.iter().sum()
+    }
+
+    /// Membrane stiffness along warp and weft, mean over the area [N/m].
+    pub fn mean_stiffness(&self) -> f64 {
+        let sum: f64 = (self.areas.iter().enumerate())
+            .map(|(t, area)| {
+                let fabric = self.fabric_of(t);
+                0.5 * area * (fabric.warp + fabric.weft)
+            })
+            .sum();
+        sum / self.area()
+    }
+
     /// Fabric of a triangle.
     pub fn fabric_of(&self, triangle: usize) -> &Fabric {
         &self.fabrics[self.panel_fabric[self.mesh.triangle_panel[triangle] as usize]]

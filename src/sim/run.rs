@@ -74,7 +74,8 @@ impl Sim {
         };
         let saved = self.state.clone();
         let flat = self.state.positions == self.mesh.placed;
-        let levels = if flat {
+        // a coarse sheet that nothing sews or carries finds folds that the fine one does not have
+        let levels = if flat && !self.mesh.seams.is_empty() {
             self.coarse_levels()?
         } else {
             Vec::new()
@@ -86,6 +87,7 @@ impl Sim {
             }
         }
         let mut engine = self.engine.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut furthest = 0.0_f64;
         let done = drape::drape(
             &mut engine,
             &mut self.state,
@@ -93,8 +95,9 @@ impl Sim {
             flat,
             &plan,
             &mut |f, s, r| {
+                furthest = furthest.max(f);
                 progress(&Progress {
-                    fraction: f,
+                    fraction: furthest,
                     stage: s,
                     residual: r,
                 })

@@ -1,191 +1,13 @@
-//! Static drape: semi-implicit steps with kinetic damping towards rest, then Newton.
-//!
-//! The equations of motion without damping are integrated by steps of one Newton correction each
-//! (Baraff and Witkin 1998); the velocities are set to zero whenever the kinetic energy has passed a
-//! maximum (Umetani et al. 2011, section 7). The step size grows while the corrections are taken in
-//! full, so that near rest the inertia fades and the iteration becomes Newton's method for the
-//! static problem.
+//! Static drape: sewing, coarse levels, the unfolding of a tangle, and rest.
 
-use super::engine::{Attempt, Engine, Motion};
+use super::engine::Engine;
+use super::relax::{RelaxOptions, Relaxed, relax};
 use super::step::{Totals, step};
-use crate::error::{Error, Result, Status};
+use crate::error::{Result, Status};
 use crate::math::Vec3;
+use crate::system::build::System;
 use crate::system::state::{Pin, State};
 use crate::tri::Transfer;
-
-/// When a relaxation stops.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RelaxOptions {
-    /// Largest static force on a free vertex [N].
-    pub force_tolerance: f64,
-    /// A gap of the seams below which sewing is done [m]; 0 to go on to the force tolerance.
-    pub seam_gap: f64,
-    /// Steps allowed.
-    pub max_steps: u64,
-    /// First step size [s].
-    pub first_step: f64,
-    /// Largest step size [s].
-    pub largest_step: f64,
-}
-
-/// How a relaxation ended.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Relaxed {
-    /// Sums.
-    pub totals: Totals,
-    /// A tolerance was met.
-    pub converged: bool,
-    /// The host asked to stop.
-    pub cancelled: bool,
-}
-
-/// Smallest step of a relaxation before it gives up [s].
-const SMALLEST_STEP: f64 = 1e-6;
-
-/// A correction below this part of the mean edge length counts as near rest.
-const NEAR: f64 = 0.05;
-/// Disturbance of the start over the mean edge length.
-const IMPERFECTION: f64 = 1e-5;
-/// Friction is frozen below this many force tolerances.
-const FREEZE: f64 = 300.0;
-/// Steps after which friction follows only every tenth step.
-const SETTLED: u64 = 30;
-
-/// Relaxes the state towards rest. `watch(step, residual)` returns false to stop.
-pub fn relax(
-    engine: &mut Engine,
-    state: &mut State,
-    options: &RelaxOptions,
-    watch: &mut dyn FnMut(u64, f64) -> bool,
-) -> Result<Relaxed> {
-    let mut out = Relaxed {
-        totals: Totals::default(),
-        converged: false,
-        cancelled: false,
-    };
-    out.totals.residual = f64::INFINITY;
-    let mut h = options.first_step;
-    let mut kinetic = [0.0; 2];
-    // the exact Hessian pays near rest, far from it the way of steepest instability leads astray: it
-    // is tried where little moves, after full steps, less often where it failed
-    let mut moved = f64::INFINITY;
-    let (mut wait, mut patience) = (4_u32, 4_u32);
-    state.velocities.fill(Vec3::zeros());
-    disturb(state, IMPERFECTION * engine.system.mean_edge());
-    while out.totals.substeps < options.max_steps {
-        let exact = wait == 0 && moved < NEAR * engine.system.mean_edge();
-        // near rest friction is frozen while Newton's method converges: anchors that move after
-        // every correction would creep
-        let follow = out.totals.residual > FREEZE * options.force_tolerance
-            && (out.totals.substeps < SETTLED || out.totals.substeps.is_multiple_of(10));
-        let (summary, reason) = match engine.attempt(state, h, 1.0, Motion::Relax { exact, follow })
-        {
-            Ok(Attempt::Accepted(summary)) => (summary, None),
-            Ok(Attempt::Rejected(reason, summary)) => (summary, Some(reason.to_owned())),
-            Err(e) if matches!(e.status, Status::NoAdmissibleState | Status::LinearSolve) => {
-                (super::newton::Summary::default(), Some(e.message))
-            }
-            Err(e) => return Err(e),
-        };
-        out.totals.newton_iterations += u64::from(summary.iterations);
-        out.totals.linear_iterations += summary.linear_iterations;
-        if exact && summary.exactness < 1.0 {
-            patience = (2 * patience).min(64);
-        } else if exact {
-            patience = 1;
-        }
-        wait = if summary.last_length < 1.0 {
-            patience
-        } else if summary.exactness == 1.0 {
-            0
-        } else if exact {
-            patience
-        } else {
-            wait.saturating_sub(1)
-        };
-        if let Some(reason) = reason {
-            out.totals.cut = true;
-            state.velocities.fill(Vec3::zeros());
-            kinetic = [0.0; 2];
-            h *= 0.25;
-            if h < SMALLEST_STEP {
-                // nothing lower can be found: rest up to rounding, or a dead end that is reported
-                out.totals.residual = engine.residual(state)?;
-                if !out.totals.residual.is_finite() {
-                    return Err(Error::new(Status::NoAdmissibleState, reason));
-                }
-                out.converged = out.totals.residual <= options.force_tolerance;
-                return Ok(out);
-            }
-            continue;
-        }
-        out.totals.substeps += 1;
-        moved = summary.moved;
-        out.totals.residual = summary.static_residual;
-        if h < SMALLEST_STEP {
-            return Ok(out);
-        }
-        let energy = kinetic_energy(engine, state);
-        if energy < kinetic[0] && kinetic[0] >= kinetic[1] {
-            state.velocities.fill(Vec3::zeros());
-            kinetic = [0.0; 2];
-        } else {
-            kinetic = [energy, kinetic[0]];
-        }
-        if summary.last_length >= 1.0 {
-            h = (h * 1.3).min(options.largest_step);
-        } else if summary.last_length < 0.3 {
-            h *= 0.6;
-        }
-        if options.seam_gap > 0.0
-            && engine.system.largest_seam_gap(&state.positions) <= options.seam_gap
-        {
-            out.converged = true;
-            return Ok(out);
-        }
-        if summary.static_residual <= options.force_tolerance {
-            engine.follow(state)?;
-            out.totals.residual = engine.residual(state)?;
-            if out.totals.residual <= options.force_tolerance {
-                out.converged = true;
-                return Ok(out);
-            }
-        }
-        if !watch(out.totals.substeps, summary.static_residual) {
-            out.cancelled = true;
-            return Ok(out);
-        }
-    }
-    Ok(out)
-}
-
-/// Moves every free vertex a little, each in its own direction: a sheet that hangs exactly in its
-/// plane has no force across it, however unstable it is, and would fold within the plane.
-fn disturb(state: &mut State, size: f64) {
-    let mut pins = state.pins.iter().map(|p| p.vertex as usize).peekable();
-    let mut bits = 0x9E37_79B9_7F4A_7C15_u64;
-    for (i, x) in state.positions.iter_mut().enumerate() {
-        let offset = Vec3::from_fn(|_, _| {
-            // xorshift (Marsaglia 2003)
-            bits ^= bits << 13;
-            bits ^= bits >> 7;
-            bits ^= bits << 17;
-            (bits >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-        });
-        if pins.next_if_eq(&i).is_none() {
-            *x += offset * size;
-        }
-    }
-}
-
-fn kinetic_energy(engine: &Engine, state: &State) -> f64 {
-    state
-        .velocities
-        .iter()
-        .zip(&engine.system.cloth.masses)
-        .map(|(v, m)| 0.5 * m * v.norm_squared())
-        .sum()
-}
 
 /// A coarser version of the garment.
 pub struct Level {
@@ -205,7 +27,19 @@ pub struct Plan {
 /// Part of the progress bar that each stage fills.
 const SEW: (f64, f64) = (0.0, 0.25);
 const SETTLE: (f64, f64) = (0.25, 0.6);
+const UNFOLD: (f64, f64) = (0.0, 0.6);
 const REST: (f64, f64) = (0.6, 1.0);
+
+/// Root mean square of the edges' strain above which positions are a tangle.
+const TANGLED: f64 = 1.0;
+/// Weight over the size of the cloth, over the stiffness of the softest membrane; its least part of
+/// the true one, for scenes without gravity.
+const SOFTEST: f64 = 0.15;
+const LEAST_FACTOR: f64 = 1e-4;
+/// Steps with the softest membrane, factor between two membranes, steps with each of them.
+const UNFOLD_STEPS: u64 = 20;
+const STIFFEN: f64 = 5.0;
+const STIFFEN_STEPS: u64 = 8;
 
 /// Rounds of Newton's method and a moment of motion that a drape may take.
 const ROUNDS: usize = 4;
@@ -274,6 +108,15 @@ pub fn drape(
         None if flat && !sew(engine, state, plan, &mut all, watch)? => return Ok(all),
         None => {}
     }
+    if !flat && tangled(&engine.system, state) {
+        let done = unfold(engine, state, plan, &mut all, watch);
+        let restored = engine.soften(1.0);
+        let done = done?;
+        restored?;
+        if done.cancelled {
+            return Ok(all);
+        }
+    }
     let options = settle_options(plan, plan.force_tolerance);
     for round in 0..ROUNDS {
         let done = stage(engine, state, &options, REST, "rest", &mut all, watch)?;
@@ -295,6 +138,45 @@ pub fn drape(
     }
     state.velocities.fill(Vec3::zeros());
     Ok(all)
+}
+
+/// Whether the positions say little of the shape: the edges are far from their lengths.
+fn tangled(system: &System, state: &State) -> bool {
+    system.rms_stretch(&state.positions) > TANGLED
+}
+
+/// Unfolds a tangle under a membrane so soft that the weight stretches the cloth several times
+/// over, then stiffens it step by step.
+///
+/// A linear step may turn a triangle by an angle `a` only as far as the stretch `a^2/2` that this
+/// brings costs less than the weight gives: a stiff membrane rolls off a fold by a few degrees in
+/// each correction, a soft one at once.
+fn unfold(
+    engine: &mut Engine,
+    state: &mut State,
+    plan: &Plan,
+    all: &mut Relaxed,
+    watch: &mut Watch<'_>,
+) -> Result<Relaxed> {
+    let cloth = &engine.system.cloth;
+    let weight = state.gravity.norm() * cloth.masses.iter().sum::<f64>() / cloth.area().sqrt();
+    let mut factor = (SOFTEST * weight / cloth.mean_stiffness()).clamp(LEAST_FACTOR, 1.0);
+    let mut options = RelaxOptions {
+        force_tolerance: 100.0 * plan.force_tolerance,
+        seam_gap: 0.0,
+        max_steps: plan.max_steps.min(UNFOLD_STEPS),
+        first_step: 0.1,
+        largest_step: 10.0,
+    };
+    loop {
+        engine.soften(factor)?;
+        let done = stage(engine, state, &options, UNFOLD, "unfold", all, watch)?;
+        factor *= STIFFEN;
+        if done.cancelled || factor >= 1.0 {
+            return Ok(done);
+        }
+        options.max_steps = plan.max_steps.min(STIFFEN_STEPS);
+    }
 }
 
 /// Lets the garment move for a moment, without advancing time. False if no step could be taken.

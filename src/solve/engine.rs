@@ -9,7 +9,7 @@ use crate::math::Vec3;
 use crate::math::parallel::Workers;
 use crate::system::assemble::{Assembler, energy};
 use crate::system::bodies::SLOPE;
-use crate::system::build::System;
+use crate::system::build::{BuildOptions, System};
 use crate::system::state::State;
 use crate::system::term::{Bodies, Configuration, World};
 
@@ -82,6 +82,18 @@ impl Engine {
         }
         self.system.set_options(&settings.into())?;
         self.settings = settings.clone();
+        self.assembler
+            .rebuild(self.system.cloth.mesh.uv.len(), &self.system.terms);
+        Ok(())
+    }
+
+    /// Multiplies the stiffness of the membrane by `factor`, 1 for the truth.
+    pub fn soften(&mut self, factor: f64) -> Result<()> {
+        let options = BuildOptions {
+            softening: factor,
+            ..(&self.settings).into()
+        };
+        self.system.set_options(&options)?;
         self.assembler
             .rebuild(self.system.cloth.mesh.uv.len(), &self.system.terms);
         Ok(())

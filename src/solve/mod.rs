@@ -4,6 +4,7 @@ pub mod drape;
 pub mod engine;
 pub mod linear;
 pub mod newton;
+pub mod relax;
 pub mod report;
 pub mod settings;
 pub mod step;

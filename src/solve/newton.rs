@@ -280,7 +280,7 @@ impl Problem<'_> {
             if length == 0.0 {
                 return Ok(summary);
             }
-            if gain <= tolerance.relative * (first - value) {
+            if tolerance.relative > 0.0 && gain <= tolerance.relative * (first - value) {
                 summary.converged = true;
                 return Ok(summary);
             }

@@ -113,6 +113,7 @@ settings! {
 impl From<&Settings> for BuildOptions {
     fn from(s: &Settings) -> Self {
         Self {
+            softening: 1.0,
             seam_stiffness: s.seam_stiffness,
             seam_pull: s.seam_pull,
             air_drag: s.air_drag,

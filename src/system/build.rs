@@ -36,6 +36,8 @@ pub struct System {
 /// What decides which terms are built.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BuildOptions {
+    /// Factor on the stiffness of the membrane; 1 but while a tangle is unfolded.
+    pub softening: f64,
     /// Seam stiffness per length [N/m^2].
     pub seam_stiffness: f64,
     /// Largest pull of an open seam per length [N/m].
@@ -111,6 +113,17 @@ impl System {
             .fold(0.0, f64::max)
     }
 
+    /// Root mean square of the edges' relative change of length.
+    pub fn rms_stretch(&self, x: &[Vec3]) -> f64 {
+        let sum: f64 = self
+            .edges
+            .iter()
+            .zip(&self.rest_lengths)
+            .map(|(e, rest)| ((x[e[1] as usize] - x[e[0] as usize]).norm() / rest - 1.0).powi(2))
+            .sum();
+        (sum / self.edges.len().max(1) as f64).sqrt()
+    }
+
     /// Largest relative stretch (or shortening, as a positive number, is not counted) of an edge.
     pub fn largest_strain(&self, x: &[Vec3]) -> f64 {
         self.edges
@@ -149,7 +162,7 @@ impl System {
 fn terms(cloth: &Cloth, options: &BuildOptions) -> Result<Vec<Box<dyn Term>>> {
     let mut terms: Vec<Box<dyn Term>> = vec![
         Box::new(Gravity::new(cloth)),
-        Box::new(Membrane::new(cloth)),
+        Box::new(Membrane::new(cloth, options.softening)),
         Box::new(BodyContact::new(cloth)),
         Box::new(EdgeContact::new(cloth)),
     ];

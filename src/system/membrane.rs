@@ -82,8 +82,8 @@ fn tensor(s: &Vec3) -> Mat2 {
 }
 
 impl Membrane {
-    /// The membrane of a cloth.
-    pub fn new(cloth: &Cloth) -> Self {
+    /// The membrane of a cloth, its stiffness times a factor.
+    pub fn new(cloth: &Cloth, factor: f64) -> Self {
         let mesh = &cloth.mesh;
         let elements = mesh
             .triangles
@@ -99,7 +99,7 @@ impl Membrane {
                 Element {
                     inverse: Mat2::new(q.y, -q.x, -p.y, p.x) / det,
                     area: 0.5 * det.abs(),
-                    stiffness: stiffness(fabric),
+                    stiffness: factor * stiffness(fabric),
                     damping: fabric.damping_stiffness,
                     fabric: cloth.panel_fabric[panel],
                     rotation,

@@ -137,7 +137,7 @@ pub fn cloth(duv: Option<&[Vec2]>, rates: &[Fabric], s: f64) -> Cloth {
 
 pub fn terms(cloth: &Cloth) -> Vec<Box<dyn Term>> {
     let mut all: Vec<Box<dyn Term>> = vec![
-        Box::new(Membrane::new(cloth)),
+        Box::new(Membrane::new(cloth, 1.0)),
         Box::new(SeamSprings::new(cloth, 5e4, 60.0)),
         Box::new(SeamHinge::new(cloth)),
         Box::new(Gravity::new(cloth)),
