@@ -12,6 +12,7 @@ mod cases;
 
 use std::time::Instant;
 use toile::math::Vec3;
+use toile::math::parallel::Workers;
 use toile::solve::linear::LinearSolver;
 use toile::solve::linear::direct::Direct;
 use toile::solve::linear::ic0::{IncompleteCholesky, Order, Storage};
@@ -46,7 +47,7 @@ fn main() {
             };
             let seams = || Order::Priorities(case.priorities.clone());
             let solvers: Vec<(&str, Box<dyn LinearSolver>)> = vec![
-                ("cholesky", Box::new(Direct::new())),
+                ("cholesky", Box::new(Direct::new(&Workers::default()))),
                 (
                     "cg jacobi",
                     Box::new(ConjugateGradients::new(Box::new(BlockJacobi::new()))),

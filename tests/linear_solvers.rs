@@ -4,6 +4,7 @@
 
 use crate::linear_cases::{Random, add, forces, residual, sewn_cloth};
 use toile::math::block::{BlockMatrix, BlockPattern};
+use toile::math::parallel::Workers;
 use toile::math::{Mat3, Vec3};
 use toile::solve::linear::choose::solver;
 use toile::solve::linear::direct::Direct;
@@ -19,7 +20,7 @@ fn all(priorities: &[u8]) -> Vec<Box<dyn LinearSolver>> {
     };
     let ic = |o, s| cg(Box::new(IncompleteCholesky::new(o, s)));
     vec![
-        Box::new(Direct::new()),
+        Box::new(Direct::new(&Workers::default())),
         cg(Box::new(BlockJacobi::new())),
         ic(Order::Natural, Storage::F64),
         ic(Order::CuthillMckee, Storage::F32),
@@ -151,7 +152,7 @@ fn matrices_that_are_not_positive_definite_are_refused() {
     let mut b = forces(30, 2);
     let mut x = vec![Vec3::zeros(); 30];
     for matrix in [&free, &negative, &indefinite, &nan] {
-        let mut direct = Direct::new();
+        let mut direct = Direct::new(&Workers::default());
         assert_eq!(
             direct.prepare(matrix),
             Err(LinearError::NotPositiveDefinite)
@@ -281,10 +282,22 @@ fn cuthill_mckee_is_a_permutation_of_small_bandwidth() {
 /// Numbers in the settings choose what they say; the automatic choice follows the stiffness.
 #[test]
 fn the_choice_follows_its_number() {
-    assert_eq!(solver(1, 2_000, None).name(), "cholesky");
-    assert_eq!(solver(2, 2_000, None).name(), "cg_jacobi");
-    assert_eq!(solver(3, 2_000, Some(&[0; 10])).name(), "cg_ic0");
-    assert_eq!(solver(4, 2_000, None).name(), "cg_cholesky");
+    assert_eq!(
+        solver(1, 2_000, None, &Workers::default()).name(),
+        "cholesky"
+    );
+    assert_eq!(
+        solver(2, 2_000, None, &Workers::default()).name(),
+        "cg_jacobi"
+    );
+    assert_eq!(
+        solver(3, 2_000, Some(&[0; 10]), &Workers::default()).name(),
+        "cg_ic0"
+    );
+    assert_eq!(
+        solver(4, 2_000, None, &Workers::default()).name(),
+        "cg_cholesky"
+    );
     for (n, h, expected) in [
         (1_600, 1e-2, "cg_ic0"),
         (4_900, 1e-3, "cg_ic0"),
@@ -293,12 +306,36 @@ fn the_choice_follows_its_number() {
         let case = sewn_cloth(n, 4, h);
         let b = forces(case.matrix.n(), 1);
         let mut x = vec![Vec3::zeros(); b.len()];
-        let mut automatic = solver(0, 2_000, Some(&case.priorities));
+        let mut automatic = solver(0, 2_000, Some(&case.priorities), &Workers::default());
         automatic.prepare(&case.matrix).expect("prepares");
         assert_eq!(automatic.name(), expected, "{n} vertices, step {h}");
         automatic
             .solve(&case.matrix, &b, &mut x, 1e-6)
             .expect("solves");
         assert!(residual(&case.matrix, &b, &x) <= 1e-6);
+    }
+}
+
+#[test]
+fn subtrees_side_by_side_give_the_same_bits_and_the_solution() {
+    let case = sewn_cloth(6_000, 3, 0.1);
+    let b = forces(case.matrix.n(), 3);
+    let solve = |threads: usize| {
+        let mut direct = Direct::new(&Workers::new(threads));
+        direct.prepare(&case.matrix).expect("prepares");
+        // small factors are not cut
+        assert!(direct.factor_length() > 1_000_000);
+        let mut x = vec![Vec3::zeros(); b.len()];
+        direct.solve(&case.matrix, &b, &mut x, 0.0).expect("solves");
+        x
+    };
+    let one = solve(1);
+    let left = residual(&case.matrix, &b, &one);
+    assert!(left < 1e-10, "residual {left:.1e}");
+    for threads in [2, 3, 8] {
+        let x = solve(threads);
+        for (p, q) in one.iter().zip(&x) {
+            assert_eq!(p.map(f64::to_bits), q.map(f64::to_bits));
+        }
     }
 }

@@ -6,6 +6,7 @@ use crate::self_contact_cases::{Random, at, squares, state};
 use std::time::Instant;
 use toile::cloth::Cloth;
 use toile::math::block::{BlockMatrix, BlockPattern};
+use toile::math::parallel::Workers;
 use toile::math::topology::edges;
 use toile::math::{Mat3, Vec3};
 use toile::solve::linear::choose::solver;
@@ -83,7 +84,7 @@ fn implicit(sheets: &Sheets, contact: &SelfContact, dt: f64) -> Vec<Vec3> {
             sink(contact.stencils().get(e));
         }
     });
-    let mut solver = solver(0, n, None);
+    let mut solver = solver(0, n, None, &Workers::default());
     let mut x: Vec<Vec3> = x0.clone();
     let mut dx = vec![Vec3::zeros(); n];
     for _ in 0..3 {

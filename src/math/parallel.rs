@@ -8,8 +8,15 @@ use rayon::prelude::*;
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 
-/// A fixed set of worker threads, or none (everything runs on the caller's thread).
+/// A fixed set of worker threads, or none (everything runs on the caller's thread). Clones share the
+/// threads.
+#[derive(Clone, Default)]
 pub struct Workers {
+    team: Option<Arc<Team>>,
+}
+
+struct Team {
+    /// `None` only while the threads are joined.
     pool: Option<rayon::ThreadPool>,
     handles: Arc<Mutex<Vec<JoinHandle<()>>>>,
 }
@@ -23,13 +30,10 @@ impl std::fmt::Debug for Workers {
 impl Workers {
     /// `count` threads; 0 or 1, or a refusal of the operating system, means the caller's thread.
     pub fn new(count: usize) -> Self {
-        let handles = Arc::new(Mutex::new(Vec::new()));
         if count <= 1 {
-            return Self {
-                pool: None,
-                handles,
-            };
+            return Self { team: None };
         }
+        let handles = Arc::new(Mutex::new(Vec::new()));
         let owned = Arc::clone(&handles);
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(count)
@@ -44,13 +48,27 @@ impl Workers {
             })
             .build()
             .ok();
-        Self { pool, handles }
+        let team = Team { pool, handles };
+        Self {
+            team: team.pool.is_some().then(|| Arc::new(team)),
+        }
+    }
+
+    fn pool(&self) -> Option<&rayon::ThreadPool> {
+        self.team.as_ref().and_then(|team| team.pool.as_ref())
+    }
+
+    /// Runs `f` on one of the threads: the loops within it then start without waking anyone first.
+    pub fn install<R: Send>(&self, f: impl FnOnce() -> R + Send) -> R {
+        match self.pool() {
+            Some(pool) => pool.install(f),
+            None => f(),
+        }
     }
 
     /// Number of threads that a loop runs on.
     pub fn count(&self) -> usize {
-        self.pool
-            .as_ref()
+        self.pool()
             .map_or(1, rayon::ThreadPool::current_num_threads)
     }
 
@@ -60,7 +78,7 @@ impl Workers {
         F: Fn(usize, &mut [T]) + Sync + Send,
     {
         let chunk = chunk.max(1);
-        match &self.pool {
+        match self.pool() {
             Some(pool) if data.len() > chunk => pool.install(|| {
                 data.par_chunks_mut(chunk)
                     .enumerate()
@@ -87,7 +105,7 @@ impl Workers {
     }
 }
 
-impl Drop for Workers {
+impl Drop for Team {
     fn drop(&mut self) {
         drop(self.pool.take());
         if let Ok(mut list) = self.handles.lock() {

@@ -57,11 +57,12 @@ impl Engine {
     pub fn new(system: System, settings: &Settings) -> Self {
         let n = system.cloth.mesh.uv.len();
         let assembler = Assembler::new(n, &system.terms);
-        let linear = linear_solver(&system, settings);
+        let workers = Workers::new(settings.threads as usize);
+        let linear = linear_solver(&system, settings, &workers);
         Self {
             assembler,
             linear,
-            workers: Workers::new(settings.threads as usize),
+            workers,
             work: Work::default(),
             weight: vec![0.0; n],
             center: vec![Vec3::zeros(); n],
@@ -74,11 +75,12 @@ impl Engine {
 
     /// Takes changed tunables: threads and the linear solver follow at once.
     pub fn set_settings(&mut self, settings: &Settings) -> Result<()> {
-        if settings.threads.to_bits() != self.settings.threads.to_bits() {
+        let threads = settings.threads.to_bits() != self.settings.threads.to_bits();
+        if threads {
             self.workers = Workers::new(settings.threads as usize);
         }
-        if settings.linear_kind.to_bits() != self.settings.linear_kind.to_bits() {
-            self.linear = linear_solver(&self.system, settings);
+        if threads || settings.linear_kind.to_bits() != self.settings.linear_kind.to_bits() {
+            self.linear = linear_solver(&self.system, settings, &self.workers);
         }
         self.system.set_options(&settings.into())?;
         self.settings = settings.clone();
@@ -127,6 +129,17 @@ impl Engine {
     /// Tries one substep of size `h` [s] that covers `fraction` of what is left of the bodies' and
     /// pins' motion. A rejected or failed attempt leaves the state untouched.
     pub fn attempt(
+        &mut self,
+        state: &mut State,
+        h: f64,
+        fraction: f64,
+        motion: Motion,
+    ) -> Result<Attempt> {
+        let workers = self.workers.clone();
+        workers.install(|| self.substep(state, h, fraction, motion))
+    }
+
+    fn substep(
         &mut self,
         state: &mut State,
         h: f64,
@@ -360,13 +373,14 @@ impl Engine {
     }
 }
 
-fn linear_solver(system: &System, settings: &Settings) -> Box<dyn LinearSolver> {
+fn linear_solver(system: &System, settings: &Settings, workers: &Workers) -> Box<dyn LinearSolver> {
     let mesh = &system.cloth.mesh;
     let priorities = seam_priorities(mesh);
     choose::solver(
         settings.linear_kind as u32,
         mesh.uv.len(),
         Some(&priorities),
+        workers,
     )
 }
 

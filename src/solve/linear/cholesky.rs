@@ -15,8 +15,10 @@
 //! when an entry is not finite.
 
 use super::LinearError;
+use super::substitution::Substitution;
 use crate::math::Vec3;
 use crate::math::block::{BlockMatrix, BlockPattern};
+use crate::math::parallel::Workers;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
 use faer::sparse::linalg::SupernodalThreshold;
@@ -77,8 +79,7 @@ pub(super) struct Cholesky<T> {
     values: Vec<T>,
     factor: Vec<T>,
     rhs: Vec<T>,
-    /// Part of a vector below a supernode.
-    below: Vec<T>,
+    substitution: Substitution<T>,
     factor_memory: MemBuffer,
     work_bytes: usize,
 }
@@ -143,7 +144,7 @@ impl<T: Number> Cholesky<T> {
             values: vec![T::of(0.0); lower.row_idx().len()],
             factor: vec![T::of(0.0); symbolic.len_val()],
             rhs: vec![T::of(0.0); 3 * n],
-            below: vec![T::of(0.0); 3 * n],
+            substitution: Substitution::new(&symbolic)?,
             factor_memory: MemBuffer::try_new(factor_need)
                 .map_err(|_| LinearError::NoConvergence)?,
             work_bytes: factor_need.unaligned_bytes_required(),
@@ -207,9 +208,7 @@ impl<T: Number> Cholesky<T> {
 
     /// Compares every pivot with the diagonal entry that it was reduced from.
     fn check_pivots(&self) -> Result<(), LinearError> {
-        let SymbolicCholeskyRaw::Supernodal(symbolic) = self.symbolic.raw() else {
-            return Err(LinearError::NoConvergence);
-        };
+        let symbolic = supernodal(&self.symbolic)?;
         let factor = supernodal::SupernodalLltRef::new(symbolic, &self.factor);
         let columns = self.lower.col_ptr();
         for s in 0..symbolic.n_supernodes() {
@@ -228,7 +227,12 @@ impl<T: Number> Cholesky<T> {
     }
 
     /// Solves with the factor.
-    pub(super) fn solve(&mut self, b: &[Vec3], x: &mut [Vec3]) -> Result<(), LinearError> {
+    pub(super) fn solve(
+        &mut self,
+        b: &[Vec3],
+        x: &mut [Vec3],
+        workers: &Workers,
+    ) -> Result<(), LinearError> {
         if b.is_empty() {
             return Ok(());
         }
@@ -237,57 +241,16 @@ impl<T: Number> Cholesky<T> {
                 self.rhs[3 * p + c] = T::of(b[c]);
             }
         }
-        self.substitute()?;
+        self.substitution.solve(
+            supernodal(&self.symbolic)?,
+            &self.factor,
+            &mut self.rhs,
+            workers,
+        );
         for (x, &p) in x.iter_mut().zip(&self.place) {
             *x = Vec3::from_fn(|c, _| self.rhs[3 * p + c].into());
             if !x.iter().all(|v| v.is_finite()) {
                 return Err(LinearError::NoConvergence);
-            }
-        }
-        Ok(())
-    }
-
-    /// `rhs = L^-T L^-1 rhs`, supernode by supernode: plain loops over the columns of the panels beat
-    /// the general dense kernels for one right-hand side and narrow panels.
-    fn substitute(&mut self) -> Result<(), LinearError> {
-        let SymbolicCholeskyRaw::Supernodal(symbolic) = self.symbolic.raw() else {
-            return Err(LinearError::NoConvergence);
-        };
-        let (begins, ends) = (symbolic.supernode_begin(), symbolic.supernode_end());
-        let (row_starts, value_starts) =
-            (symbolic.col_ptr_for_row_idx(), symbolic.col_ptr_for_val());
-        let (rows, x) = (symbolic.row_idx(), &mut self.rhs);
-        for s in 0..symbolic.n_supernodes() {
-            let (begin, width) = (begins[s], ends[s] - begins[s]);
-            let rows = &rows[row_starts[s]..row_starts[s + 1]];
-            let panel = &self.factor[value_starts[s]..value_starts[s + 1]];
-            let below = &mut self.below[..rows.len()];
-            below.fill(T::of(0.0));
-            for (j, column) in panel.chunks_exact(width + rows.len()).enumerate() {
-                let value = x[begin + j] / column[j];
-                x[begin + j] = value;
-                for (x, l) in x[begin + j + 1..].iter_mut().zip(&column[j + 1..width]) {
-                    *x -= *l * value;
-                }
-                for (b, l) in below.iter_mut().zip(&column[width..]) {
-                    *b += *l * value;
-                }
-            }
-            for (b, row) in below.iter().zip(rows) {
-                x[*row] -= *b;
-            }
-        }
-        for s in (0..symbolic.n_supernodes()).rev() {
-            let (begin, width) = (begins[s], ends[s] - begins[s]);
-            let rows = &rows[row_starts[s]..row_starts[s + 1]];
-            let panel = &self.factor[value_starts[s]..value_starts[s + 1]];
-            let below = &mut self.below[..rows.len()];
-            for (b, row) in below.iter_mut().zip(rows) {
-                *b = x[*row];
-            }
-            for (j, column) in panel.chunks_exact(width + rows.len()).enumerate().rev() {
-                let inside = dot(&column[j + 1..width], &x[begin + j + 1..begin + width]);
-                x[begin + j] = (x[begin + j] - inside - dot(&column[width..], below)) / column[j];
             }
         }
         Ok(())
@@ -305,7 +268,7 @@ impl<T: Number> Cholesky<T> {
 
     /// Bytes held.
     pub(super) fn bytes(&self) -> usize {
-        let numbers = self.values.len() + self.factor.len() + 2 * self.rhs.len();
+        let numbers = self.values.len() + self.factor.len() + self.rhs.len();
         let indices = self.place.len()
             + self.source.len()
             + self.starts.len()
@@ -319,28 +282,18 @@ impl<T: Number> Cholesky<T> {
             + 8 * (indices + symbolic)
             + 4 * (self.pattern.rows.len() + self.pattern.starts.len())
             + self.work_bytes
+            + self.substitution.bytes()
     }
 }
 
-/// Inner product in a fixed order, in eight strands so that it can be vectorised.
-fn dot<T: Number>(a: &[T], b: &[T]) -> T {
-    const STRANDS: usize = 8;
-    let mut sums = [T::of(0.0); STRANDS];
-    let (whole_a, rest_a) = a.as_chunks::<STRANDS>();
-    let (whole_b, rest_b) = b.as_chunks::<STRANDS>();
-    for (a, b) in whole_a.iter().zip(whole_b) {
-        for k in 0..STRANDS {
-            sums[k] += a[k] * b[k];
-        }
+/// The supernodal analysis, the only kind that is asked for.
+pub(super) fn supernodal(
+    symbolic: &SymbolicCholesky<usize>,
+) -> Result<&supernodal::SymbolicSupernodalCholesky<usize>, LinearError> {
+    match symbolic.raw() {
+        SymbolicCholeskyRaw::Supernodal(symbolic) => Ok(symbolic),
+        SymbolicCholeskyRaw::Simplicial(_) => Err(LinearError::NoConvergence),
     }
-    let mut sum = T::of(0.0);
-    for k in 0..STRANDS / 2 {
-        sum += sums[k] + sums[k + STRANDS / 2];
-    }
-    for (a, b) in rest_a.iter().zip(rest_b) {
-        sum += *a * *b;
-    }
-    sum
 }
 
 /// New place of each block row under approximate minimum degree.

@@ -21,12 +21,14 @@
 //! restored run takes the same.
 
 use super::direct::Direct;
-use super::factored::StiffFactor;
+use super::factored::SingleFactor;
 use super::ic0::{IncompleteCholesky, Order, Storage};
 use super::jacobi::BlockJacobi;
 use super::pcg::ConjugateGradients;
+use super::stiff_part::StiffPart;
 use super::{LinearError, LinearSolver};
 use crate::math::block::BlockMatrix;
+use crate::math::parallel::Workers;
 use crate::math::{Mat3, Vec3};
 
 /// Stiffness over mass below which incomplete factors are enough.
@@ -41,19 +43,25 @@ const ALWAYS_DIRECT: usize = 300;
 ///
 /// `priorities` (see [`super::ordering`]), one for each block row, mark the vertices of seams for
 /// the incomplete factorization.
-pub fn solver(kind: u32, n: usize, priorities: Option<&[u8]>) -> Box<dyn LinearSolver> {
+pub fn solver(
+    kind: u32,
+    n: usize,
+    priorities: Option<&[u8]>,
+    workers: &Workers,
+) -> Box<dyn LinearSolver> {
     match kind {
-        1 => Box::new(Direct::new()),
+        1 => Box::new(Direct::new(workers)),
         2 => Box::new(ConjugateGradients::new(Box::new(BlockJacobi::new()))),
         3 => Box::new(incomplete(priorities)),
-        4 => Box::new(factored()),
-        _ if n < ALWAYS_DIRECT => Box::new(Direct::new()),
-        _ => Box::new(Automatic::new(priorities)),
+        4 => Box::new(factored(workers)),
+        _ if n < ALWAYS_DIRECT => Box::new(Direct::new(workers)),
+        _ => Box::new(Automatic::new(priorities, workers)),
     }
 }
 
-fn factored() -> ConjugateGradients {
-    ConjugateGradients::new(Box::new(StiffFactor::default())).for_newton()
+fn factored(workers: &Workers) -> ConjugateGradients {
+    let factor = Box::new(SingleFactor::new(workers));
+    ConjugateGradients::new(Box::new(StiffPart::new(factor))).for_newton()
 }
 
 fn incomplete(priorities: Option<&[u8]>) -> ConjugateGradients {
@@ -61,7 +69,8 @@ fn incomplete(priorities: Option<&[u8]>) -> ConjugateGradients {
         Some(p) => Order::Priorities(p.to_vec()),
         None => Order::CuthillMckee,
     };
-    ConjugateGradients::new(Box::new(IncompleteCholesky::new(order, Storage::F64)))
+    let factor = Box::new(IncompleteCholesky::new(order, Storage::F64));
+    ConjugateGradients::new(factor)
 }
 
 /// Chooses for each matrix; what the others refuse is solved directly.
@@ -83,11 +92,11 @@ enum Choice {
 
 impl Automatic {
     /// With the priorities of [`solver`].
-    pub fn new(priorities: Option<&[u8]>) -> Self {
+    pub fn new(priorities: Option<&[u8]>, workers: &Workers) -> Self {
         Self {
-            direct: Direct::new(),
+            direct: Direct::new(workers),
             incomplete: incomplete(priorities),
-            factored: factored(),
+            factored: factored(workers),
             chosen: Choice::Direct,
             ratios: Vec::new(),
             sums: Vec::new(),

@@ -7,6 +7,7 @@ use super::cholesky::Cholesky;
 use super::{LinearError, LinearSolver};
 use crate::math::Vec3;
 use crate::math::block::BlockMatrix;
+use crate::math::parallel::Workers;
 
 /// Sparse Cholesky with a cached symbolic analysis.
 #[derive(Default)]
@@ -14,12 +15,16 @@ pub struct Direct {
     cholesky: Option<Cholesky<f64>>,
     /// Whether the factor belongs to the matrix last prepared.
     factored: bool,
+    workers: Workers,
 }
 
 impl Direct {
     /// A solver that has seen no matrix yet.
-    pub fn new() -> Self {
-        Self::default()
+    pub fn new(workers: &Workers) -> Self {
+        Self {
+            workers: workers.clone(),
+            ..Self::default()
+        }
     }
 
     /// Stored numbers of the factor, padding of supernodes included; 0 before the first matrix.
@@ -49,7 +54,7 @@ impl LinearSolver for Direct {
     ) -> Result<u32, LinearError> {
         match &mut self.cholesky {
             Some(cholesky) if self.factored && b.len() == cholesky.n() => {
-                cholesky.solve(b, x)?;
+                cholesky.solve(b, x, &self.workers)?;
                 Ok(1)
             }
             _ => Err(LinearError::NoConvergence),

@@ -3,7 +3,7 @@
 //! * [`direct`]: supernodal Cholesky, ordered by approximate minimum degree on the block graph.
 //! * [`pcg`]: conjugate gradients with a [`pcg::Preconditioner`]: [`jacobi`] (3x3 diagonal blocks),
 //!   [`ic0`] (incomplete Cholesky on the pattern of `A`, in an [`ordering`]) or [`factored`] (the
-//!   complete factor of an earlier matrix).
+//!   complete factor of an earlier matrix), the latter two made from the [`stiff_part`].
 //! * [`choose`]: which of them, by number or by measured crossover.
 
 mod cholesky;
@@ -14,6 +14,8 @@ pub mod ic0;
 pub mod jacobi;
 pub mod ordering;
 pub mod pcg;
+pub mod stiff_part;
+mod substitution;
 
 use crate::math::Vec3;
 use crate::math::block::BlockMatrix;
