@@ -331,7 +331,7 @@ fn subtrees_side_by_side_give_the_same_bits_and_the_solution() {
     };
     let one = solve(1);
     let left = residual(&case.matrix, &b, &one);
-    assert!(left < 1e-10, "residual {left:.1e}");
+    assert!(left < 1e-8, "residual {left:.1e}");
     for threads in [2, 3, 8] {
         let x = solve(threads);
         for (p, q) in one.iter().zip(&x) {

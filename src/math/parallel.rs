@@ -58,7 +58,7 @@ impl Workers {
         self.team.as_ref().and_then(|team| team.pool.as_ref())
     }
 
-    /// Runs `f` on one of the threads: the loops within it then start without waking anyone first.
+    /// Runs `f` on one of the threads: the loops within it start without a hand-over to another one.
     pub fn install<R: Send>(&self, f: impl FnOnce() -> R + Send) -> R {
         match self.pool() {
             Some(pool) => pool.install(f),
