@@ -13,21 +13,13 @@
     reason = "a benchmark may panic"
 )]
 
+mod common;
+
+use common::{Random, cpu};
 use std::time::Instant;
 use toile::body::{Body, mannequin, read_obj};
 use toile::math::Vec3;
 use toile::math::parallel::Workers;
-
-/// Processor time of all threads of this process [s], in steps of 10 ms.
-fn cpu() -> f64 {
-    let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    let after = text.rsplit(')').next().unwrap_or("");
-    let field = |n: usize| -> f64 {
-        let word = after.split_whitespace().nth(n);
-        word.and_then(|w| w.parse().ok()).unwrap_or(f64::NAN)
-    };
-    (field(11) + field(12)) / 100.0
-}
 
 /// Least wall time of `repeats` calls, and the mean processor time.
 fn time<T>(repeats: usize, mut f: impl FnMut(usize) -> T) -> (f64, f64) {
@@ -41,25 +33,16 @@ fn time<T>(repeats: usize, mut f: impl FnMut(usize) -> T) -> (f64, f64) {
     (best, (cpu() - used) / repeats as f64)
 }
 
-/// Small deterministic generator (splitmix64), uniform in 0..1.
-fn random(state: &mut u64) -> f64 {
-    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let mut z = *state;
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-}
-
 /// Mean and largest error of the field within two cells of the surface [cells].
 fn error(body: &Body) -> (f64, f64) {
     let h = body.cell_size().unwrap();
     let (v, t) = (body.vertices(), body.triangles());
-    let mut seed = 1;
+    let mut random = Random::new(1);
     let (mut sum, mut worst, count) = (0.0, 0.0f64, 500);
     for _ in 0..count {
-        let tri = t[(random(&mut seed) * t.len() as f64) as usize].map(|i| v[i as usize]);
+        let tri = t[(random.next() * t.len() as f64) as usize].map(|i| v[i as usize]);
         let center = (tri[0] + tri[1] + tri[2]) / 3.0;
-        let shift = Vec3::from_fn(|_, _| 2.0 * random(&mut seed) - 1.0) * (2.0 * h);
+        let shift = Vec3::from_fn(|_, _| 2.0 * random.next() - 1.0) * (2.0 * h);
         let p = center + shift;
         let e = (body.value(&p) - body.exact_distance(&p)).abs() / h;
         sum += e;

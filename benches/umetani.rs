@@ -13,6 +13,9 @@
     reason = "a benchmark may panic"
 )]
 
+mod common;
+
+use common::Random;
 use toile::pattern::{BendingModel, Fabric};
 use toile::sim::{DrapeOptions, Outcome, Settings, Sim, SimOptions};
 use toile::tri::grid::{SheetPattern, sheet_garment, structured_sheet};
@@ -46,21 +49,9 @@ fn sheet(n: usize, bending: f64) -> Sim {
     sim
 }
 
-/// xorshift64*, uniform in 0..1.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        (self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-}
-
 fn scattered(n: usize, bending: f64, seed: u64) -> Sim {
     let mut sim = sheet(n, bending);
-    let mut random = Random(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1);
+    let mut random = Random::new(seed);
     let pinned = sim.positions().len() - 1;
     let held = [pinned - n, pinned];
     let positions: Vec<[f64; 3]> = sim

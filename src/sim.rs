@@ -85,6 +85,7 @@ impl Sim {
     /// A simulation on a mesh of the caller's making, for benchmarks and tests of the mechanics.
     pub fn from_mesh(garment: &Garment, mesh: GarmentMesh, options: &SimOptions) -> Result<Self> {
         let gravity = options.gravity.unwrap_or([0.0, -9.81, 0.0]);
+        garment.check()?;
         finite("gravity", &gravity)?;
         finite("wind", &options.wind)?;
         finite("pressure", &[options.pressure])?;

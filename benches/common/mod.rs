@@ -1,0 +1,47 @@
+//! What several benchmarks need: processor time, random numbers, medians, fitted exponents.
+
+#![allow(dead_code, reason = "every benchmark uses a part of it")]
+
+/// Processor time of all threads of this process [s], in steps of 10 ms.
+pub(crate) fn cpu() -> f64 {
+    let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    let after = text.rsplit(')').next().unwrap_or("");
+    let field = |n: usize| -> f64 {
+        let word = after.split_whitespace().nth(n);
+        word.and_then(|w| w.parse().ok()).unwrap_or(f64::NAN)
+    };
+    (field(11) + field(12)) / 100.0
+}
+
+/// A small deterministic generator (xorshift64*).
+pub(crate) struct Random(u64);
+
+impl Random {
+    /// Streams of different seeds have nothing in common.
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1)
+    }
+
+    /// Uniform in 0..1.
+    pub(crate) fn next(&mut self) -> f64 {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        (self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
+
+/// The value in the middle.
+pub(crate) fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+/// The exponent `p` of `cost = c n^p`, by least squares of the logarithms.
+pub(crate) fn exponent(points: &[(f64, f64)]) -> f64 {
+    let n = points.len() as f64;
+    let logs: Vec<(f64, f64)> = points.iter().map(|(x, y)| (x.ln(), y.ln())).collect();
+    let mean = |f: &dyn Fn(&(f64, f64)) -> f64| logs.iter().map(f).sum::<f64>() / n;
+    let (x, y) = (mean(&|p| p.0), mean(&|p| p.1));
+    mean(&|p| (p.0 - x) * (p.1 - y)) / mean(&|p| (p.0 - x).powi(2))
+}
