@@ -46,6 +46,8 @@ mod hard_cases;
 mod header;
 #[path = "layering.rs"]
 mod layering;
+#[path = "licences.rs"]
+mod licences;
 #[path = "linear_solvers.rs"]
 mod linear_solvers;
 #[path = "pattern_bytes.rs"]
