@@ -40,6 +40,8 @@ mod capi_threads;
 mod cli_toile;
 #[path = "docs.rs"]
 mod docs;
+#[path = "fmi.rs"]
+mod fmi;
 #[path = "hard_cases.rs"]
 mod hard_cases;
 #[path = "header.rs"]

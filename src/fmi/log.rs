@@ -110,7 +110,7 @@ mod tests {
         let sink: Sink =
             Box::new(move |_, category, _| own.lock().unwrap().push(category.to_owned()));
         let mut log = Log::new(Some(sink), false);
-        let mut all = |log: &Log| {
+        let all = |log: &Log| {
             for s in [Status::Ok, Status::Warning, Status::Discard, Status::Error] {
                 log.say(s, String::new);
             }
