@@ -82,3 +82,60 @@ fn nothing_stays_in_the_process() {
 fn ball_and_cloth_exchange_pose_and_force() {
     python(&["test_coupling.py"]);
 }
+
+#[test]
+fn python_helpers_sweep_over_parameters() {
+    python(&["test_package.py"]);
+}
+
+/// A panic in a call ends that call and the run, not the process; a reset builds the simulation anew.
+#[test]
+fn a_panic_inside_is_an_error_and_a_reset_leads_back() {
+    use std::sync::{Arc, Mutex};
+    use toile::fmi::instance::Instance;
+    use toile::fmi::log::{Log, Sink, Status};
+    use toile::fmi::model::{About, Model};
+    use toile::fmi::table::fingerprint;
+
+    let folder = std::env::temp_dir().join(format!("toile-fmi-panic-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let scene = support::root().join("examples/sphere_scene.json");
+    std::fs::copy(&scene, folder.join("scene.json")).unwrap();
+    let read = toile::scene::Scene::from_file(&scene).unwrap();
+    let (model, _) = Model::new(read).unwrap();
+    let about = About {
+        token: "token".into(),
+        variables: fingerprint(&model.variables),
+    };
+    std::fs::write(folder.join("fmu.json"), about.to_json()).unwrap();
+    let heard = Arc::new(Mutex::new(Vec::new()));
+    let own = Arc::clone(&heard);
+    let sink: Sink = Box::new(move |_, _, text| own.lock().unwrap().push(text.to_owned()));
+    let log = Log::new(Some(sink), false);
+    let mut cloth = Instance::new("cloth", "token", &folder, log).unwrap();
+    let step = |cloth: &mut Instance| {
+        assert_eq!(
+            cloth.call("enter", Instance::enter_initialization),
+            Status::Ok
+        );
+        assert_eq!(
+            cloth.call("exit", Instance::exit_initialization),
+            Status::Ok
+        );
+        assert_eq!(cloth.call("step", |i| i.do_step(0.0, 0.002)), Status::Ok);
+        cloth.save().unwrap()
+    };
+    let first = step(&mut cloth);
+    let status = cloth.call("boom", |_| panic!("number {}", 7));
+    assert_eq!(status, Status::Error);
+    assert!(heard.lock().unwrap()[0].contains("number 7"));
+    assert!(cloth.is_terminated() && cloth.save().is_err());
+    assert_eq!(cloth.call("step", |i| i.do_step(0.0, 0.01)), Status::Error);
+    assert!(heard.lock().unwrap()[1].contains("internal error"));
+    assert_eq!(cloth.call_anyway("reset", Instance::reset), Status::Ok);
+    assert!(step(&mut cloth) == first);
+    let _ = cloth.call("boom", |_| panic!("again"));
+    assert_eq!(cloth.call_anyway("load", |i| i.load(&first)), Status::Ok);
+    assert!(cloth.save().unwrap() == first);
+    std::fs::remove_dir_all(&folder).unwrap();
+}

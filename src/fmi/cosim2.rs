@@ -235,8 +235,8 @@ macro_rules! numbers {
         ) -> i32 {
             host::with(c.addr(), stringify!($set), |i| {
                 // SAFETY: the master's lists.
-                let (references, values) =
-                    unsafe { (input(vr, nvr, "vr")?, input(value, nvr, "value")?) };
+                let lists = unsafe { (input(vr, nvr, "vr")?, input(value, nvr, "value")?) };
+                let (references, values) = lists;
                 let values: Vec<f64> = values.iter().map(|&v| f64::from(v)).collect();
                 i.write(Kind::$kind, references, &values, true)
             }) as i32

@@ -217,9 +217,9 @@ macro_rules! numbers {
             nValues: usize,
         ) -> i32 {
             host::with(instance.addr(), stringify!($get), |i| {
+                let (vr, n) = (valueReferences, nValueReferences);
                 // SAFETY: the master's list of references.
-                let references =
-                    unsafe { input(valueReferences, nValueReferences, "valueReferences")? };
+                let references = unsafe { input(vr, n, "valueReferences")? };
                 let read = i.read(Kind::$kind, references, nValues, false)?;
                 let read = read.into_iter().map(|v| v as $type);
                 // SAFETY: room for `nValues`, which is as many as were read.

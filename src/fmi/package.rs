@@ -116,18 +116,9 @@ pub fn package(
     scratch.write(&collected.all())?;
     let scene = scratch.scene().map_err(|e| e.at(path.display()))?;
     if scene.run.drape && options.drape {
-        let held = !scene.bodies.is_empty() || !scene.pins.is_empty();
-        if held {
-            let state = drape(scene, options, &mut notes, progress)?;
-            collected.files.insert(STATE_FILE.into(), state);
-            collected.set("initial", json!({"snapshot": STATE_FILE}))?;
-        } else {
-            notes.push(
-                "neither a body nor a pin holds the garment: it is not draped, the run begins with \
-                 the placed panels"
-                    .into(),
-            );
-        }
+        let state = drape(scene, options, &mut notes, progress)?;
+        collected.files.insert(STATE_FILE.into(), state);
+        collected.set("initial", json!({"snapshot": STATE_FILE}))?;
     }
     // what is draped is draped now
     let mut run = collected.scene.get("run").cloned().unwrap_or(json!({}));
@@ -184,7 +175,8 @@ pub fn package(
     })
 }
 
-/// The draped state as bytes.
+/// The draped state as bytes. Without anything that holds the garment it would fall for ever, or be
+/// blown away: it is sewn and relaxed without the forces that do it.
 fn drape(
     mut scene: Scene,
     options: &Options,
@@ -192,6 +184,15 @@ fn drape(
     progress: &mut dyn FnMut(&Progress) -> bool,
 ) -> Result<Vec<u8>> {
     scene.set_number(crate::scene::THREADS, options.threads)?;
+    let (gravity, wind, pressure) = (scene.gravity, scene.wind, scene.pressure);
+    if scene.bodies.is_empty() && scene.pins.is_empty() {
+        (scene.gravity, scene.wind, scene.pressure) = ([0.0; 3], [0.0; 3], 0.0);
+        notes.push(
+            "neither a body nor a pin holds the garment: it is draped without gravity, wind and \
+             pressure, and falls when the run begins"
+                .into(),
+        );
+    }
     let mut sim = sim_scene::build(&scene)?;
     let plan = DrapeOptions {
         force_tolerance: 0.0,
@@ -205,6 +206,11 @@ fn drape(
             report.residual
         ));
     }
+    for (k, axis) in ["x", "y", "z"].iter().enumerate() {
+        sim.set_number(&format!("gravity.{axis}"), gravity[k])?;
+        sim.set_number(&format!("wind.{axis}"), wind[k])?;
+    }
+    sim.set_number("pressure", pressure)?;
     sim.save()
 }
 

@@ -188,12 +188,32 @@ def test_scene_with_files_is_packed_whole(folder):
     cloth.free()
 
 
-def test_bare_garment_is_packed_and_says_that_nothing_holds_it(folder):
-    out = folder / "bare" / "skirt.fmu"
+def test_bare_garment_is_sewn_and_falls(folder):
+    """Two sheets, one seam, nothing else: packed with the seam closed; then only gravity acts."""
+    out = folder / "bare" / "pair.fmu"
     out.parent.mkdir()
-    done = pack({**scenes.SHEET, "edge_length": 0.1}, out)
-    assert "is not draped" in done.stderr
+    left = scenes.SHEET["panels"][0]
+    place = {"translation": [0.62, 0.5, 0], "rotation_deg": [-90, 0, 0]}
+    pair = {
+        **scenes.SHEET,
+        "edge_length": 0.15,
+        "panels": [left, {**left, "name": "right", "placement": place}],
+        "seams": [{"a": ["sheet", 1], "b": ["right", 3]}],
+    }
+    done = pack(pair, out)
+    assert "draped without gravity" in done.stderr
     assert validation.validate_fmu(str(out)) == []
+    fmu = Fmu(out, out.parent / "unpacked")
+    cloth = fmu.instance()
+    assert cloth.put({"air.drag": 0.0, "air.tangential": 0.0}) == 0
+    assert cloth.initialize() == 0
+    assert cloth.get("seam.gap.max") < 1e-3
+    before = cloth.get("centre_of_mass[2]")
+    cloth.run(10)
+    # backward Euler with its own substeps: between g h^2 n^2 / 2 and g h^2 n (n + 1) / 2
+    fallen = before - cloth.get("centre_of_mass[2]")
+    assert 0.049 <= fallen <= 0.054, fallen
+    cloth.free()
 
 
 def test_draped_scene_begins_at_rest(folder):
