@@ -60,7 +60,7 @@ fn archives_hold_what_fmi_asks_for() {
 
 #[test]
 fn calls_in_and_out_of_order_are_answered() {
-    python(&["test_calls.py"]);
+    python(&["test_calls.py", "test_random_calls.py"]);
 }
 
 #[test]

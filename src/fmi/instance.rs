@@ -3,14 +3,17 @@
 //!
 //! How a run is made of values: until the initialization ends, the simulation is a function of the
 //! values alone (`stale` says that it is yet to be made). From then on a step takes the inputs as
-//! they are when it begins, and outputs are those of its end.
+//! they are when it begins, and outputs are those of its end. `values` reads and sets variables,
+//! `states` saves and restores.
+
+mod states;
+mod values;
 
 use super::drive;
 use super::log::{Log, Status};
 use super::model::Model;
 use super::results::Results;
-use super::saved::Saved;
-use super::variables::{Causality, Kind, Quantity, Variability, Variable};
+use super::variables::{Quantity, Variable};
 use crate::error::{self, Error, Result};
 use crate::sim::{DrapeOptions, Outcome, Sim};
 use crate::system::state::State;
@@ -367,202 +370,5 @@ impl Instance {
             self.stale = true;
         }
         Ok(Status::Ok)
-    }
-
-    fn typed(&self, kind: Kind, reference: u32, fmi2: bool) -> Result<&Variable> {
-        let variable = self.model.variable(reference)?;
-        if variable.kind != kind {
-            return Err(Error::argument(format!(
-                "{} (value reference {reference}) is {}, not {}",
-                variable.name,
-                variable.kind.name(),
-                kind.name()
-            )));
-        }
-        if fmi2 && !variable.is_in_fmi2() {
-            return Err(Error::argument(format!(
-                "{} (value reference {reference}) is an array, which FMI 2 does not have",
-                variable.name
-            )));
-        }
-        Ok(variable)
-    }
-
-    /// Values of variables, arrays flattened row by row; `count` must be the number of them.
-    pub fn read(
-        &mut self,
-        kind: Kind,
-        references: &[u32],
-        count: usize,
-        fmi2: bool,
-    ) -> std::result::Result<Vec<f64>, Fault> {
-        let (mut size, mut computed) = (0_usize, false);
-        for &reference in references {
-            let variable = self.typed(kind, reference, fmi2)?;
-            size = size.saturating_add(variable.size());
-            computed |= !variable.is_settable() && variable.quantity != Quantity::Time;
-        }
-        if size != count {
-            return Err(Error::argument(format!(
-                "{count} values were given room, the variables have {size}"
-            ))
-            .into());
-        }
-        if computed {
-            self.refresh()?;
-        }
-        let mut out = Vec::with_capacity(count);
-        for &reference in references {
-            let variable = &self.model.variables[reference as usize];
-            if variable.is_settable() {
-                out.push(self.values[reference as usize]);
-            } else if variable.quantity == Quantity::Time {
-                out.push(self.time);
-            } else {
-                self.results
-                    .read(&self.model, &self.sim, variable, &mut out)?;
-            }
-        }
-        Ok(out)
-    }
-
-    /// Sets variables, all of them or, on an error, none.
-    pub fn write(&mut self, kind: Kind, references: &[u32], values: &[f64], fmi2: bool) -> Answer {
-        if references.len() != values.len() {
-            return Err(Error::argument(format!(
-                "{} values for {} variables, which are scalars",
-                values.len(),
-                references.len()
-            ))
-            .into());
-        }
-        for (&reference, &value) in references.iter().zip(values) {
-            let variable = self.typed(kind, reference, fmi2)?;
-            if !variable.is_settable() {
-                return Err(Error::argument(format!(
-                    "{} is {} and cannot be set",
-                    variable.name,
-                    variable.causality.name()
-                ))
-                .into());
-            }
-            self.expect(settable_in(variable))
-                .map_err(|e| e.at(format!("setting {}", variable.name)))?;
-            variable.check(value)?;
-        }
-        for (&reference, &value) in references.iter().zip(values) {
-            let slot = &mut self.values[reference as usize];
-            let changed = slot.to_bits() != value.to_bits();
-            *slot = value;
-            self.stale |= changed && self.mode != Mode::Step;
-        }
-        Ok(Status::Ok)
-    }
-
-    /// Bytes of binary variables; they stay where they are until the next call that reads some.
-    pub fn read_binaries(
-        &mut self,
-        references: &[u32],
-        count: usize,
-    ) -> std::result::Result<&[Vec<u8>], Fault> {
-        for &reference in references {
-            self.typed(Kind::Binary, reference, false)?;
-        }
-        if references.len() != count {
-            return Err(Error::argument(format!(
-                "{count} values were given room, the variables have {}",
-                references.len()
-            ))
-            .into());
-        }
-        self.refresh()?;
-        let bytes = self.sim.save()?;
-        self.binaries = vec![bytes; references.len()];
-        Ok(&self.binaries)
-    }
-
-    /// Everything that the next answers depend on.
-    pub fn save(&mut self) -> Result<Vec<u8>> {
-        if self.broken {
-            return Err(Error::state(
-                "nothing is left to save after an internal error",
-            ));
-        }
-        let saved = Saved {
-            mode: self.mode,
-            values: self.values.clone(),
-            applied: self.applied.clone(),
-            start: self.start,
-            stop: self.stop,
-            time: self.time,
-            stale: self.stale,
-            report: self.results.report,
-            snapshot: if self.stale {
-                Vec::new()
-            } else {
-                self.sim.save()?
-            },
-        };
-        saved.to_bytes(&self.token)
-    }
-
-    /// Refuses bytes that are no saved state of this FMU.
-    pub fn check_saved(&self, bytes: &[u8]) -> Result<()> {
-        self.read_saved(bytes).map(drop)
-    }
-
-    fn read_saved(&self, bytes: &[u8]) -> Result<Saved> {
-        let saved = Saved::from_bytes(bytes, &self.token)?;
-        for values in [&saved.values, &saved.applied] {
-            if values.len() != self.values.len() {
-                return Err(Error::parse(format!(
-                    "FMU state: {} values, {} are expected",
-                    values.len(),
-                    self.values.len()
-                )));
-            }
-            let settable = self.model.variables.iter().zip(values);
-            for (variable, &value) in settable.filter(|(v, _)| v.is_settable()) {
-                variable.check(value).map_err(|e| e.at("FMU state"))?;
-            }
-        }
-        Ok(saved)
-    }
-
-    /// Goes to a saved state; on error the simulation is as it was.
-    pub fn load(&mut self, bytes: &[u8]) -> Answer {
-        let saved = self.read_saved(bytes)?;
-        let differs = !saved.stale && self.model.differ(&saved.values, &self.compiled);
-        if self.broken || differs {
-            let mut sim = self.model.compile(&saved.values)?;
-            let origin = sim.checkpoint();
-            if !saved.stale {
-                sim.restore(&saved.snapshot)?;
-            }
-            (self.sim, self.origin) = (sim, origin);
-            self.compiled.clone_from(&saved.values);
-            self.broken = false;
-        } else if !saved.stale {
-            self.sim.restore(&saved.snapshot)?;
-        }
-        if !saved.stale {
-            drive::settings(&self.model, &saved.applied, &mut self.sim)?;
-        }
-        self.mode = saved.mode;
-        self.values = saved.values;
-        self.applied = saved.applied;
-        (self.start, self.stop, self.time) = (saved.start, saved.stop, saved.time);
-        self.stale = saved.stale;
-        self.results = Results::of(saved.report);
-        Ok(Status::Ok)
-    }
-}
-
-/// Modes in which a variable may be set.
-fn settable_in(variable: &Variable) -> &'static [Mode] {
-    match (variable.causality, variable.variability) {
-        (Causality::Structural, _) => &[Mode::Configuration],
-        (Causality::Parameter, Variability::Fixed) => &[Mode::Instantiated, Mode::Initialization],
-        _ => &[Mode::Instantiated, Mode::Initialization, Mode::Step],
     }
 }
