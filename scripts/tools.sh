@@ -20,6 +20,18 @@ if [ ! -x target/venv/bin/python ] || ! target/venv/bin/python -c 'import numpy,
   mkdir -p target
   python3 -m venv target/venv && target/venv/bin/pip install --quiet --disable-pip-version-check numpy pytest setuptools wheel
 fi
+# masters of FMI for the tests; libcosim's wheels do not exist for every platform
+if [ -x target/venv/bin/python ] && ! target/venv/bin/python -c 'import fmpy' 2>/dev/null; then
+  echo "tools: installing fmpy and libcosimpy in target/venv"
+  target/venv/bin/python -m pip install --quiet --disable-pip-version-check fmpy==0.3.32
+  target/venv/bin/python -m pip install --quiet --disable-pip-version-check libcosimpy==0.0.6 ||
+    echo "tools: libcosimpy cannot be installed here; its test is skipped"
+fi
+# parameter sweeps of FMUs
+if [ -x target/venv/bin/python ] && ! target/venv/bin/python -c 'import distributed, matplotlib' 2>/dev/null; then
+  echo "tools: installing distributed and matplotlib in target/venv"
+  target/venv/bin/python -m pip install --quiet --disable-pip-version-check distributed==2026.8.0 matplotlib==3.11.2
+fi
 # what `pip install ./python` asks for, so that its test needs no network
 if [ -x target/venv/bin/python ] && ! ls target/wheels/numpy-* target/wheels/setuptools-* target/wheels/wheel-* >/dev/null 2>&1; then
   echo "tools: fetching wheels into target/wheels"

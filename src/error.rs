@@ -3,7 +3,9 @@
 //! The codes are the ones of the C ABI and never change their value: `-1..` use of the API,
 //! `-20..` data, `-40..` numerics, `-60..` GPU, `-100` a panic caught at the boundary.
 
+use std::any::Any;
 use std::fmt;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// What went wrong, as a number that is fixed for ever.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -79,6 +81,28 @@ impl fmt::Display for Error {
 }
 
 impl std::error::Error for Error {}
+
+/// Runs `body`; a panic becomes an error of status `Panic`. What the panic may have left
+/// half-changed must not be looked at again: callers give it up or build it anew.
+pub fn catch<T>(body: impl FnOnce() -> Result<T>) -> Result<T> {
+    catch_unwind(AssertUnwindSafe(body)).unwrap_or_else(|payload| {
+        let text = panic_text(&*payload);
+        // a payload whose own drop panics must not get out either
+        let _ = catch_unwind(AssertUnwindSafe(move || drop(payload)));
+        Err(Error::new(
+            Status::Panic,
+            format!("internal error, please report it: {text}"),
+        ))
+    })
+}
+
+fn panic_text(payload: &(dyn Any + Send)) -> String {
+    payload
+        .downcast_ref::<&str>()
+        .map(|s| (*s).to_owned())
+        .or_else(|| payload.downcast_ref::<String>().cloned())
+        .unwrap_or_else(|| "no text".to_owned())
+}
 
 macro_rules! constructors {
     ($($name:ident => $status:ident),* $(,)?) => {

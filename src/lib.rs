@@ -7,6 +7,7 @@ pub mod body;
 pub mod capi;
 pub mod cloth;
 pub mod error;
+pub mod fmi;
 pub mod math;
 pub mod pattern;
 pub mod readout;

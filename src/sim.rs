@@ -133,6 +133,17 @@ impl Sim {
         snapshot::write(&self.state, self.fingerprint)
     }
 
+    /// A copy of the state, to go back to with [`Sim::roll_back`]: cheaper than bytes.
+    pub fn checkpoint(&self) -> State {
+        self.state.clone()
+    }
+
+    /// Goes back to a state that this simulation was in.
+    pub fn roll_back(&mut self, state: State) {
+        self.state = state;
+        self.epoch += 1;
+    }
+
     /// Restores saved bytes of the same garment and bodies; on error nothing changes.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<()> {
         let mut state = snapshot::read(bytes, self.fingerprint, &self.state)?;

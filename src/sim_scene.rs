@@ -2,6 +2,7 @@
 //!
 //! [`build`] compiles the garment, places bodies and pins and puts the initial state in. A
 //! [`Driver`] then tells the simulation, before each step, where bodies and pins are at its end.
+//! [`pinned_vertices`] and [`along`] find the vertices that pins and probes of a scene mean.
 
 use crate::body::Pose;
 use crate::error::{Error, Result};
@@ -80,33 +81,37 @@ fn add(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 }
 
 /// Vertices of each pin of the scene.
-fn pinned_vertices(sim: &Sim, scene: &Scene) -> Result<Vec<Vec<u32>>> {
-    let mesh = sim.mesh();
+pub fn pinned_vertices(sim: &Sim, scene: &Scene) -> Result<Vec<Vec<u32>>> {
     scene
         .pins
         .iter()
         .enumerate()
-        .map(|(i, pin)| {
-            match pin.place {
-                PinPlace::Point(uv) => sim.locate(pin.panel, uv).map(|v| vec![v]),
-                PinPlace::Edge(edge) => mesh
-                    .edge_vertices
-                    .get(pin.panel as usize)
-                    .and_then(|edges| edges.get(edge as usize))
-                    .map(|vertices| {
-                        // a closed edge starts and ends at one vertex
-                        let mut vertices = vertices.clone();
-                        vertices.sort_unstable();
-                        vertices.dedup();
-                        vertices
-                    })
-                    .ok_or_else(|| {
-                        Error::argument(format!("panel {} has no edge {edge}", pin.panel))
-                    }),
-            }
-            .map_err(|e| e.at(format!("pins[{i}]")))
-        })
+        .map(|(i, pin)| place(sim, pin.panel, pin.place).map_err(|e| e.at(format!("pins[{i}]"))))
         .collect()
+}
+
+/// Vertices at a place of a panel: one, or those of an edge in rising order without repetition.
+fn place(sim: &Sim, panel: u32, place: PinPlace) -> Result<Vec<u32>> {
+    match place {
+        PinPlace::Point(uv) => sim.locate(panel, uv).map(|v| vec![v]),
+        PinPlace::Edge(edge) => {
+            // a closed edge starts and ends at one vertex
+            let mut vertices = along(sim, panel, edge)?.to_vec();
+            vertices.sort_unstable();
+            vertices.dedup();
+            Ok(vertices)
+        }
+    }
+}
+
+/// Vertices along an edge of a panel, from its start to its end.
+pub fn along(sim: &Sim, panel: u32, edge: u32) -> Result<&[u32]> {
+    sim.mesh()
+        .edge_vertices
+        .get(panel as usize)
+        .and_then(|edges| edges.get(edge as usize))
+        .map(Vec::as_slice)
+        .ok_or_else(|| Error::argument(format!("panel {panel} has no edge {edge}")))
 }
 
 /// Moves bodies and pins of a scene.

@@ -3,11 +3,12 @@
 
 use std::path::Path;
 
-const PAGES: [&str; 4] = [
+const PAGES: [&str; 5] = [
     "README.md",
     "ARCHITECTURE.md",
     "CONTRIBUTING.md",
     "CHANGELOG.md",
+    "docs/fmi.md",
 ];
 /// What the build or a run makes.
 const MADE: [&str; 3] = ["target", "out", "build"];

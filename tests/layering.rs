@@ -26,7 +26,7 @@ const ORDER: [&str; 20] = [
     "report",
     "capi",
 ];
-/// Side by side at the right end: none imports another.
+/// Side by side at the right end: none imports another, but for the program, which packs FMUs.
 const ENDS: [&str; 3] = ["capi", "fmi", "bin"];
 
 fn sources(folder: &Path, out: &mut Vec<PathBuf>) {
@@ -148,6 +148,7 @@ fn modules_import_only_from_the_left() {
             seen += 1;
             match rank(&import) {
                 Some(other) if other < own => {}
+                Some(_) if module == "bin" && import == "fmi" => {}
                 _ => wrong.push(format!("src/{file} imports crate::{import}")),
             }
         }

@@ -78,6 +78,8 @@ fn full(folder: &Folder) -> Value {
             {"panel": 0, "edge": 2, "motion": [{"time": 0, "offset": [0, 0, 0]},
                                                {"time": 1, "offset": [0, 0, 0.1]}]}
         ],
+        "probes": [{"name": "corner", "panel": "square", "uv": [1, 1]},
+                   {"name": "hem", "panel": 0, "edge": 1}],
         "initial": {"file": "start.obj", "velocity": [0, 0, 1]},
         "run": {"drape": false, "duration": 1, "dt": 0.01, "frame_every": 5}
     })
@@ -221,6 +223,8 @@ fn a_scene_holds_what_the_file_says() {
     assert_eq!(scene.pins[0].place, PinPlace::Point([0.0, 1.0]));
     assert_eq!(scene.pins[0].until, Some(2.5));
     assert_eq!(scene.pins[1].place, PinPlace::Edge(2));
+    assert_eq!(scene.probes[0].place, PinPlace::Point([1.0, 1.0]));
+    assert_eq!(scene.probes[1].name, "hem");
     assert_eq!(scene.initial.positions.as_ref().map(Vec::len), Some(3));
     assert_eq!(scene.initial.velocity, [0.0, 0.0, 1.0]);
     assert_eq!(scene.run.steps(), 100);

@@ -40,12 +40,16 @@ mod capi_threads;
 mod cli_toile;
 #[path = "docs.rs"]
 mod docs;
+#[path = "fmi.rs"]
+mod fmi;
 #[path = "hard_cases.rs"]
 mod hard_cases;
 #[path = "header.rs"]
 mod header;
 #[path = "layering.rs"]
 mod layering;
+#[path = "licences.rs"]
+mod licences;
 #[path = "linear_solvers.rs"]
 mod linear_solvers;
 #[path = "pattern_bytes.rs"]

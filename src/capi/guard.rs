@@ -3,11 +3,10 @@
 //! The host's panic hook is left alone: what it prints, it prints.
 
 use super::status::{TOILE_OK, number, toile_status};
-use crate::error::{Error, Result, Status};
-use std::any::Any;
+use crate::error::Result;
+pub(super) use crate::error::catch;
 use std::cell::RefCell;
 use std::ffi::{CString, c_char};
-use std::panic::{AssertUnwindSafe, catch_unwind};
 
 thread_local! {
     static LAST_ERROR: RefCell<CString> = RefCell::new(CString::default());
@@ -35,27 +34,6 @@ pub(super) fn value<T>(otherwise: T, body: impl FnOnce() -> Result<T>) -> T {
         Ok(())
     });
     result
-}
-
-/// Runs `body`; a panic becomes an error of status `Panic`.
-pub(super) fn catch<T>(body: impl FnOnce() -> Result<T>) -> Result<T> {
-    catch_unwind(AssertUnwindSafe(body)).unwrap_or_else(|payload| {
-        let text = panic_text(&*payload);
-        // a payload whose own drop panics must not get out either
-        let _ = catch_unwind(AssertUnwindSafe(move || drop(payload)));
-        Err(Error::new(
-            Status::Panic,
-            format!("internal error, please report it: {text}"),
-        ))
-    })
-}
-
-fn panic_text(payload: &(dyn Any + Send)) -> String {
-    payload
-        .downcast_ref::<&str>()
-        .map(|s| (*s).to_owned())
-        .or_else(|| payload.downcast_ref::<String>().cloned())
-        .unwrap_or_else(|| "no text".to_owned())
 }
 
 /// Text for C: ends at its first NUL.
@@ -97,6 +75,7 @@ pub(super) use entry;
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::{Error, Status};
     use std::ffi::CStr;
 
     fn text() -> String {

@@ -214,7 +214,8 @@ pub unsafe extern "C" fn toile_sim_set_body_pose(
         SIMS.get(sim.addr())?;
         let position = input::numbers::<3>(position, "position")?;
         let xyzw = input::numbers::<4>(quaternion_xyzw, "quaternion_xyzw")?;
-        let xyzw = input::quaternion(xyzw, "quaternion_xyzw")?;
+        // checked here, made a unit one there: every host gets the same bits
+        input::quaternion(xyzw, "quaternion_xyzw")?;
         write(sim, |sim, _| sim.set_body_pose(body, position, xyzw))
     })
 }

@@ -6,6 +6,7 @@ pub mod block;
 pub mod boxtree;
 pub mod diff;
 pub mod geometry;
+pub mod hash;
 pub mod parallel;
 pub mod spd;
 pub mod topology;

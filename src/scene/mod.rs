@@ -33,6 +33,8 @@ pub struct Scene {
     pub pressure: f64,
     /// Held points.
     pub pins: Vec<ScenePin>,
+    /// Named points and curves of the garment that hosts watch.
+    pub probes: Vec<SceneProbe>,
     /// Tunables.
     pub settings: Settings,
     /// Whether the scene says on how many threads it runs; else the host chooses.
@@ -80,6 +82,17 @@ pub struct ScenePin {
     pub motion: Vec<OffsetKey>,
     /// Time at which the pin lets go [s].
     pub until: Option<f64>,
+}
+
+/// A point or a curve of the garment that hosts watch by name.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneProbe {
+    /// Name, no two alike.
+    pub name: String,
+    /// Panel index.
+    pub panel: u32,
+    /// A point (its nearest vertex), or an edge: the curve of its vertices.
+    pub place: PinPlace,
 }
 
 /// State to start from.
@@ -167,6 +180,7 @@ impl Scene {
             wind: [0.0; 3],
             pressure: 0.0,
             pins: Vec::new(),
+            probes: Vec::new(),
             settings: Settings::default(),
             threads_given: false,
             initial: Initial::default(),

@@ -159,6 +159,12 @@ impl Reader<'_> {
                 scene.pins.extend(self.keep(pin));
             }
         }
+        if let Some(nodes) = object.get("probes").and_then(|n| self.keep(n.array())) {
+            for node in &nodes {
+                let probe = pins::probe(node, garment.as_ref(), &scene.probes);
+                scene.probes.extend(self.keep(probe));
+            }
+        }
         if let Some(node) = object.get("initial") {
             let initial = initial(&node, self.base_dir);
             scene.initial = self.keep(initial).unwrap_or_default();

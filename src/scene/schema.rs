@@ -84,6 +84,13 @@ pub const SCENE: &[Key] = &[
     ),
     key("pins", "array", "", "none", "held points and edges"),
     key(
+        "probes",
+        "array",
+        "",
+        "none",
+        "named points and edges that hosts watch",
+    ),
+    key(
         "numbers",
         "object",
         "",
@@ -333,6 +340,32 @@ pub const PIN: &[Key] = &[
     ),
 ];
 
+/// Keys of a probe.
+pub const PROBE: &[Key] = &[
+    key("name", "text", "", "required", "no two alike"),
+    key(
+        "panel",
+        "text or integer",
+        "",
+        "required",
+        "panel by name or index",
+    ),
+    key(
+        "uv",
+        "[u, v]",
+        "m",
+        "this or edge",
+        "flat point; the nearest vertex is watched",
+    ),
+    key(
+        "edge",
+        "integer",
+        "",
+        "this or uv",
+        "edge number; the curve of its vertices is watched",
+    ),
+];
+
 /// Keys of a keyframe of a pin.
 pub const OFFSET: &[Key] = &[
     key("time", "number", "s", "required", "times increase"),
@@ -401,6 +434,7 @@ pub const TABLES: &[(&str, &[Key])] = &[
     ("bodies[].motion.keyframes[]", KEYFRAME),
     ("pins[]", PIN),
     ("pins[].motion[]", OFFSET),
+    ("probes[]", PROBE),
     ("initial", INITIAL),
     ("run", RUN),
 ];

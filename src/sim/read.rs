@@ -100,6 +100,13 @@ impl Sim {
         Ok(out)
     }
 
+    /// Gradient of elastic, contact and outer energies in the present state [N], one vector for each
+    /// vertex, pinned ones included. On a free vertex at rest it vanishes; on a held one it is what
+    /// its holder bears, turned around.
+    pub fn forces(&self) -> Result<Vec<Vec3>> {
+        self.engine().forces(&self.state)
+    }
+
     /// A sentence for each panel that was refined with a lower angle limit than asked for.
     fn lowered_angles(&self) -> Vec<String> {
         self.mesh

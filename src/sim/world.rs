@@ -63,6 +63,15 @@ impl Sim {
         Ok(())
     }
 
+    /// Puts a body at a pose at once and without velocity, whether time has passed or not: for hosts
+    /// that choose where a run begins.
+    pub fn place_body(&mut self, body: u32, position: [f64; 3], xyzw: [f64; 4]) -> Result<()> {
+        self.set_body_pose(body, position, xyzw)?;
+        let state = &mut self.state.bodies[body as usize];
+        state.pose = state.target;
+        Ok(())
+    }
+
     /// Vertices of a deforming mesh body at the end of the next step, body frame [m]; like a pose, a
     /// placement before the first step or drape.
     pub fn set_body_vertices(&mut self, body: u32, positions: &[[f64; 3]]) -> Result<()> {
@@ -158,6 +167,12 @@ impl Sim {
         self.state.pins.retain(|p| !vertices.contains(&p.vertex));
         self.epoch += 1;
         Ok(())
+    }
+
+    /// Whether a vertex is held.
+    pub fn is_pinned(&self, vertex: u32) -> bool {
+        let pins = &self.state.pins;
+        pins.binary_search_by_key(&vertex, |p| p.vertex).is_ok()
     }
 
     fn check_vertices(&self, vertices: &[u32]) -> Result<()> {

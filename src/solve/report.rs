@@ -1,7 +1,9 @@
 //! What a step or a drape reports.
 
+use serde::{Deserialize, Serialize};
+
 /// Why a solve stopped.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(u32)]
 pub enum Outcome {
     /// Every tolerance was met.
@@ -27,7 +29,7 @@ impl Outcome {
 }
 
 /// Numbers of one `step` or `drape`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StepReport {
     /// Why it stopped.
     pub outcome: Outcome,

@@ -8,30 +8,15 @@ use super::state::State;
 use crate::cloth::Cloth;
 use crate::error::{Error, Result};
 use crate::math::Vec3;
+use crate::math::hash::Hash;
 
 const MAGIC: &[u8; 8] = b"TOILESNP";
 const VERSION: u32 = 1;
 const HEADER: usize = 8 + 4 + 8 + 8;
 
-/// FNV-1a, 64 bits.
-#[derive(Clone, Copy)]
-struct Hash(u64);
-
-impl Hash {
-    fn new() -> Self {
-        Self(0xcbf2_9ce4_8422_2325)
-    }
-
-    fn add(&mut self, bytes: &[u8]) {
-        for b in bytes {
-            self.0 = (self.0 ^ u64::from(*b)).wrapping_mul(0x0000_0100_0000_01b3);
-        }
-    }
-}
-
 /// A number that two systems share only if their meshes and fabrics are the same.
 pub fn fingerprint(cloth: &Cloth) -> u64 {
-    let mut hash = Hash::new();
+    let mut hash = Hash::default();
     for p in &cloth.mesh.uv {
         hash.add(&p.x.to_bits().to_le_bytes());
         hash.add(&p.y.to_bits().to_le_bytes());
@@ -47,7 +32,7 @@ pub fn fingerprint(cloth: &Cloth) -> u64 {
     for f in &cloth.fabrics {
         hash.add(format!("{f:?}").as_bytes());
     }
-    hash.0
+    hash.value()
 }
 
 /// Bytes of a state.
@@ -59,9 +44,9 @@ pub fn write(state: &State, fingerprint: u64) -> Result<Vec<u8>> {
     bytes.extend_from_slice(&fingerprint.to_le_bytes());
     bytes.extend_from_slice(&(payload.len() as u64).to_le_bytes());
     bytes.extend_from_slice(&payload);
-    let mut hash = Hash::new();
+    let mut hash = Hash::default();
     hash.add(&bytes);
-    bytes.extend_from_slice(&hash.0.to_le_bytes());
+    bytes.extend_from_slice(&hash.value().to_le_bytes());
     Ok(bytes)
 }
 
@@ -93,9 +78,9 @@ pub fn read(bytes: &[u8], fingerprint: u64, like: &State) -> Result<State> {
         )));
     }
     let end = bytes.len() - 8;
-    let mut hash = Hash::new();
+    let mut hash = Hash::default();
     hash.add(&bytes[..end]);
-    if hash.0 != number(end) {
+    if hash.value() != number(end) {
         return Err(bad("the checksum does not agree".into()));
     }
     if number(12) != fingerprint {

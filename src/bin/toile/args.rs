@@ -23,6 +23,8 @@ pub(crate) enum Command {
     Info(SceneArgs),
     /// Lists every problem of a scene with its place; exit code 1 if there are any.
     Check(SceneArgs),
+    /// Packs a scene into an FMU that masters of FMI 3.0 or 2.0 load.
+    Fmu(FmuArgs),
     /// Prints every key of scene files: type, unit, default, meaning.
     Schema {
         /// As a JSON Schema document (draft 2020-12).
@@ -90,6 +92,40 @@ pub(crate) struct RunArgs {
     /// Simulates one further second and reports the largest motion in it.
     #[arg(long)]
     pub(crate) verify: bool,
+}
+
+/// How to pack an FMU.
+#[derive(Args)]
+pub(crate) struct FmuArgs {
+    #[command(flatten)]
+    pub(crate) scene: SceneArgs,
+    /// Archive to write; the model is named after it.
+    #[arg(short, long, value_name = "FMU")]
+    pub(crate) out: PathBuf,
+    /// Version of FMI: 3 or 2.
+    #[arg(long, value_name = "2|3", default_value_t = 3, value_parser = clap::value_parser!(u8).range(2..=3))]
+    pub(crate) fmi: u8,
+    /// libtoile for a platform, such as aarch64-linux=libtoile.so; may be given several times. By
+    /// default the one beside this program, for the platform of this program.
+    #[arg(long, value_name = "PLATFORM=FILE", value_parser = library)]
+    pub(crate) library: Vec<(String, PathBuf)>,
+    /// FMU of the same scene, made on another platform, whose binaries are taken in as well; may be
+    /// given several times.
+    #[arg(long, value_name = "FMU")]
+    pub(crate) merge: Vec<PathBuf>,
+    /// Begins with the placed panels even if the scene says to drape.
+    #[arg(long)]
+    pub(crate) no_drape: bool,
+    /// No progress.
+    #[arg(long)]
+    pub(crate) quiet: bool,
+}
+
+fn library(text: &str) -> Result<(String, PathBuf), String> {
+    let (platform, file) = text
+        .split_once('=')
+        .ok_or_else(|| format!("'{text}' is not PLATFORM=FILE"))?;
+    Ok((platform.to_owned(), PathBuf::from(file)))
 }
 
 fn assignment(text: &str) -> Result<(String, f64), String> {

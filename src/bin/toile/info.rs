@@ -49,7 +49,7 @@ fn apply(scene: &mut Scene, args: &SceneArgs) -> Result<()> {
 }
 
 /// Cores that this program may use, as many as the setting admits.
-fn every_core() -> f64 {
+pub(crate) fn every_core() -> f64 {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let most = Settings::KEYS
         .iter()

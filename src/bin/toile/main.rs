@@ -5,6 +5,7 @@
 //! written. A drape that stops at its iteration limit ends with 0 and says so in `outcome`.
 
 mod args;
+mod fmu;
 mod info;
 mod output;
 mod picture;
@@ -29,6 +30,7 @@ fn main() -> ExitCode {
         Command::Run(args) => run::run(args),
         Command::Info(args) => info::info(args),
         Command::Check(args) => info::check(args),
+        Command::Fmu(args) => fmu::fmu(args),
         Command::Schema { json } => {
             if *json {
                 out(&format!("{:#}\n", toile::scene::schema::json_schema()))

@@ -125,7 +125,7 @@ pub(crate) fn run(args: &RunArgs) -> Done {
 }
 
 /// A bar on the terminal; nothing where there is none.
-fn bar(quiet: bool) -> ProgressBar {
+pub(crate) fn bar(quiet: bool) -> ProgressBar {
     if quiet {
         return ProgressBar::hidden();
     }

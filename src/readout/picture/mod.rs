@@ -68,12 +68,21 @@ impl Picture {
     pub fn write_png(&self, path: &std::path::Path) -> Result<()> {
         let fail = |e: &dyn std::fmt::Display| Error::io(format!("{}: {e}", path.display()));
         let file = std::fs::File::create(path).map_err(|e| fail(&e))?;
+        self.encode(std::io::BufWriter::new(file))
+            .map_err(|e| e.at(path.display()))
+    }
+
+    /// The bytes of a PNG file.
+    pub fn to_png(&self) -> Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        self.encode(&mut bytes)?;
+        Ok(bytes)
+    }
+
+    fn encode(&self, out: impl std::io::Write) -> Result<()> {
+        let fail = |e: &dyn std::fmt::Display| Error::io(e.to_string());
         let size = |n: usize| u32::try_from(n).map_err(|e| fail(&e));
-        let mut encoder = png::Encoder::new(
-            std::io::BufWriter::new(file),
-            size(self.width)?,
-            size(self.height)?,
-        );
+        let mut encoder = png::Encoder::new(out, size(self.width)?, size(self.height)?);
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
         encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);

@@ -1,15 +1,13 @@
-//! Pins of a scene file.
+//! Pins and probes of a scene file: places on panels.
 
 use super::offset_keys;
 use crate::error::Result;
 use crate::pattern::Garment;
-use crate::pattern::import::read::Node;
-use crate::scene::{PinPlace, ScenePin, schema};
+use crate::pattern::import::read::{Node, Object};
+use crate::scene::{PinPlace, ScenePin, SceneProbe, schema};
 
-/// Reads a pin; panel and edge are looked up where the garment is known.
-pub(super) fn pin(node: &Node<'_>, garment: Option<&Garment>) -> Result<ScenePin> {
-    let object = node.object()?;
-    object.only(schema::PIN)?;
+/// Reads panel and place, looked up where the garment is known.
+fn place(object: &Object<'_>, garment: Option<&Garment>) -> Result<(u32, PinPlace)> {
     let panel_node = object.need("panel")?;
     let panel = match (panel_node.value.as_str(), garment) {
         (Some(_), None) => 0,
@@ -40,6 +38,35 @@ pub(super) fn pin(node: &Node<'_>, garment: Option<&Garment>) -> Result<ScenePin
         }
         _ => return Err(object.error("give either uv or edge")),
     };
+    Ok((panel, place))
+}
+
+/// Reads a probe; `before` are those that came earlier.
+pub(super) fn probe(
+    node: &Node<'_>,
+    garment: Option<&Garment>,
+    before: &[SceneProbe],
+) -> Result<SceneProbe> {
+    let object = node.object()?;
+    object.only(schema::PROBE)?;
+    let name_node = object.need("name")?;
+    let name = name_node.text()?;
+    if name.is_empty() || before.iter().any(|p| p.name == name) {
+        return Err(name_node.error(format!("{name:?} must not be empty or given twice")));
+    }
+    let (panel, place) = place(&object, garment)?;
+    Ok(SceneProbe {
+        name: name.to_owned(),
+        panel,
+        place,
+    })
+}
+
+/// Reads a pin; panel and edge are looked up where the garment is known.
+pub(super) fn pin(node: &Node<'_>, garment: Option<&Garment>) -> Result<ScenePin> {
+    let object = node.object()?;
+    object.only(schema::PIN)?;
+    let (panel, place) = place(&object, garment)?;
     let target = match object.get("target") {
         None => None,
         Some(target) if matches!(place, PinPlace::Edge(_)) => {
