@@ -73,13 +73,45 @@ pub fn crossings_with(
     ))
 }
 
-/// Pairs of vertices that the seams of a garment tie together.
+/// Part of an edge within which a seam's link ties vertex to vertex.
+const ONE_POINT: f64 = 1e-6;
+
+/// Pairs of vertices that the seams of a garment tie together: a vertex and the ends of the edge that
+/// it is sewn to, and all vertices that are sewn into one point, as where four panels meet.
 pub fn glued_pairs(mesh: &GarmentMesh) -> Vec<[u32; 2]> {
-    mesh.seams
-        .iter()
-        .flat_map(|s| &s.links)
+    let links = || mesh.seams.iter().flat_map(|s| &s.links);
+    let mut pairs: Vec<[u32; 2]> = links()
         .flat_map(|l| l.edge.map(|e| [l.vertex, e]))
-        .collect()
+        .collect();
+    // the smallest vertex of each point stands for it
+    let mut point: Vec<u32> = (0..mesh.uv.len() as u32).collect();
+    let find = |point: &[u32], mut v: u32| {
+        while point[v as usize] != v {
+            v = point[v as usize];
+        }
+        v
+    };
+    let mut members = Vec::new();
+    for link in links() {
+        let other = match link.t {
+            t if t <= ONE_POINT => link.edge[0],
+            t if t >= 1.0 - ONE_POINT => link.edge[1],
+            _ => continue,
+        };
+        let (a, b) = (find(&point, link.vertex), find(&point, other));
+        point[a.max(b) as usize] = a.min(b);
+        members.extend([link.vertex, other]);
+    }
+    members.sort_unstable();
+    members.dedup();
+    let mut groups: Vec<(u32, u32)> = members.iter().map(|&v| (find(&point, v), v)).collect();
+    groups.sort_unstable();
+    for group in groups.chunk_by(|a, b| a.0 == b.0) {
+        for (i, (_, a)) in group.iter().enumerate() {
+            pairs.extend(group[i + 1..].iter().map(|(_, b)| [*a, *b]));
+        }
+    }
+    pairs
 }
 
 fn check(triangles: &[[u32; 3]], positions: &[Vec3]) -> Result<()> {
@@ -157,4 +189,53 @@ fn side(a: &Vec3, b: &Vec3, c: &Vec3, d: &Vec3) -> f64 {
         z: v.z,
     });
     robust::orient3d(a, b, c, d)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Vec2;
+    use crate::tri::{SeamLink, SeamMesh};
+
+    #[test]
+    fn all_vertices_sewn_into_one_point_are_glued() {
+        let link = |vertex, edge, t| SeamLink {
+            vertex,
+            edge,
+            t,
+            length: 0.01,
+        };
+        // four panels meet: 0 with 2, 2 with 4, 6 with 4; 8 is sewn into the middle of an edge
+        let links = vec![
+            link(0, [2, 3], 0.0),
+            link(2, [5, 4], 1.0),
+            link(6, [4, 7], 0.0),
+            link(8, [2, 3], 0.5),
+        ];
+        let mesh = GarmentMesh {
+            uv: vec![Vec2::zeros(); 9],
+            seams: vec![SeamMesh {
+                links,
+                ..SeamMesh::default()
+            }],
+            ..GarmentMesh::default()
+        };
+        let pairs = glued_pairs(&mesh);
+        let has = |a: u32, b: u32| pairs.contains(&[a, b]) || pairs.contains(&[b, a]);
+        for (a, b) in [
+            (0, 2),
+            (0, 4),
+            (0, 6),
+            (2, 4),
+            (2, 6),
+            (4, 6),
+            (8, 2),
+            (8, 3),
+        ] {
+            assert!(has(a, b), "{a} and {b}");
+        }
+        for (a, b) in [(8, 0), (8, 4), (0, 8), (0, 7)] {
+            assert!(!has(a, b), "{a} and {b}");
+        }
+    }
 }
