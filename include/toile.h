@@ -1098,7 +1098,8 @@ toile_status toile_sim_drape(struct toile_sim *sim,
                              struct toile_step_report *report);
 
 /**
- * The report of the present state without advancing it: counts 0, residual, strain, gaps and
+ * The report of the present state without advancing it: counts 0; the outcome is converged if it is
+ * at rest to the force tolerance of a drape, else iteration limit; residual, strain, gaps and
  * energies as they are.
  */
 toile_status toile_sim_report(const struct toile_sim *sim, struct toile_step_report *report);

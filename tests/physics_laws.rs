@@ -464,3 +464,41 @@ fn a_refused_or_failed_call_leaves_the_state_as_it_was() {
     }
     assert!(sim.save().unwrap() == fresh.save().unwrap());
 }
+
+#[test]
+fn a_stopped_drape_keeps_what_it_did_and_goes_on() {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
+    let text = std::fs::read_to_string(path.join("tshirt.json")).unwrap();
+    let garment = toile::pattern::import::garment_from_json(&text, Some(&path)).unwrap();
+    let body = toile::body::mannequin::body(0.01).unwrap();
+    let mut sim = Sim::new(&garment, &SimOptions::default()).unwrap();
+    sim.add_body(&body, &ContactSettings::default()).unwrap();
+    let whole = DrapeOptions {
+        force_tolerance: 0.0,
+        max_steps: 0,
+    };
+    // stopped on the coarse mesh, first while it sews, then while it settles on the fine one
+    let mut gap = sim.report().unwrap().max_seam_gap;
+    for calls in [60, 120] {
+        let mut count = 0;
+        let before = sim.positions().to_vec();
+        let report = sim
+            .drape(&whole, &mut |_| {
+                count += 1;
+                count < calls
+            })
+            .unwrap();
+        assert_eq!(report.outcome, Outcome::Cancelled);
+        assert!(furthest(&before, sim.positions()) > 1e-3);
+        assert!(report.max_seam_gap < gap, "{} m", report.max_seam_gap);
+        gap = report.max_seam_gap;
+        let now = sim.report().unwrap();
+        assert_eq!(now.outcome, Outcome::IterationLimit);
+        assert!((now.residual / report.residual - 1.0).abs() < 1e-9);
+    }
+    let report = sim.drape(&whole, &mut |_| true).unwrap();
+    println!("{report:?}");
+    assert_eq!(report.outcome, Outcome::Converged);
+    assert!(report.max_seam_gap < 2e-3 && report.min_gap > -1e-3);
+    assert_eq!(sim.report().unwrap().outcome, Outcome::Converged);
+}

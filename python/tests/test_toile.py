@@ -1,6 +1,5 @@
 """The package against the library: small garments, real calls."""
 
-import gc
 import json
 import os
 from pathlib import Path
@@ -109,13 +108,16 @@ def test_errors_carry_the_text_of_the_library():
         toile.Body.mesh(np.zeros((3, 3)), [[0, 1, -2]])
 
 
-def test_a_view_keeps_the_simulation_alive():
-    sim = toile.Sim(square())
-    expected = sim.positions.copy()
-    view = sim.positions
-    del sim
-    gc.collect()
-    np.testing.assert_array_equal(view, expected)
+def test_positions_outlive_steps_and_the_simulation():
+    with toile.Sim(square()) as sim:
+        kept = sim.positions
+        expected = kept.copy()
+        for _ in range(3):
+            sim.step(0.01)
+        assert not np.array_equal(sim.positions, expected)
+    filler = [np.full(kept.shape, 7.0) for _ in range(100)]
+    np.testing.assert_array_equal(kept, expected)
+    assert len(filler) == 100
 
 
 def test_json_and_svg_come_back():

@@ -185,23 +185,21 @@ class Sim(_Owner):
         address = ctypes.cast(view.data, ctypes.c_void_p).value
         length = (view.count - 1) * view.stride + view.components * 8
         memory = (ctypes.c_uint8 * length).from_address(address)
-        # the buffer refers to this object: the library's memory lives while a view does
-        memory._owner = self
-        out = np.ndarray(
-            (view.count, view.components), np.float64, memory, strides=(view.stride, 8)
-        )
+        shape = (view.count, view.components)
+        # the library may move its memory in any call, and frees it with the simulation
+        out = np.ndarray(shape, np.float64, memory, strides=(view.stride, 8)).copy()
         out.flags.writeable = False
         return out
 
     @property
     def positions(self) -> np.ndarray:
-        """Positions [m], shape (vertices, 3): a read-only view without a copy, valid until the
-        next call that changes this simulation. Copy it to keep it."""
+        """Positions [m] as they are now, shape (vertices, 3), read-only: an array of its own, which
+        later calls neither change nor invalidate."""
         return self._view(lib.toile_sim_positions_view)
 
     @property
     def velocities(self) -> np.ndarray:
-        """Velocities [m/s], shape (vertices, 3); a view like `positions`."""
+        """Velocities [m/s], shape (vertices, 3), like `positions`."""
         return self._view(lib.toile_sim_velocities_view)
 
     def set_positions(self, positions: Array, velocities: Optional[Array] = None) -> None:

@@ -108,7 +108,8 @@ fn go_on(desc: &toile_drape_desc, progress: &Progress) -> bool {
     callback(desc.progress_user, &raw const progress) == 0
 }
 
-/// The report of the present state without advancing it: counts 0, residual, strain, gaps and
+/// The report of the present state without advancing it: counts 0; the outcome is converged if it is
+/// at rest to the force tolerance of a drape, else iteration limit; residual, strain, gaps and
 /// energies as they are.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn toile_sim_report(

@@ -152,16 +152,20 @@ impl Sim {
         Ok(levels)
     }
 
-    /// Numbers of the present state without advancing it (counts are zero).
+    /// Numbers of the present state without advancing it (counts are zero). The outcome tells
+    /// whether it is at rest to the force tolerance of a drape.
     pub fn report(&self) -> Result<StepReport> {
         let mut engine = self.engine();
-        describe(
-            &mut engine,
-            &self.state,
-            &Totals::default(),
-            Outcome::Converged,
-            0.0,
-        )
+        let totals = Totals {
+            residual: engine.residual(&self.state)?,
+            ..Totals::default()
+        };
+        let outcome = if totals.residual <= self.settings.drape_force_tolerance {
+            Outcome::Converged
+        } else {
+            Outcome::IterationLimit
+        };
+        describe(&mut engine, &self.state, &totals, outcome, 0.0)
     }
 }
 

@@ -80,33 +80,41 @@ pub fn drape(
     for level in levels {
         let mut coarse = level.engine;
         let mut coarse_state = coarse_state(&coarse, engine, state);
-        match &carried {
-            Some((from, positions)) => transfer(from, positions, &coarse, &mut coarse_state)?,
-            None => {
-                if !sew(&mut coarse, &mut coarse_state, plan, &mut all, watch)? {
-                    return Ok(all);
-                }
+        let sewn = match &carried {
+            Some((from, positions)) => {
+                transfer(from, positions, &coarse, &mut coarse_state)?;
+                true
             }
-        }
-        let options = settle_options(plan, 100.0 * plan.force_tolerance);
-        let done = stage(
-            &mut coarse,
-            &mut coarse_state,
-            &options,
-            SETTLE,
-            "settle",
-            &mut all,
-            watch,
-        )?;
-        if done.cancelled {
-            return Ok(all);
+            None => sew(&mut coarse, &mut coarse_state, plan, &mut all, watch)?,
+        };
+        if sewn {
+            let options = settle_options(plan, 100.0 * plan.force_tolerance);
+            stage(
+                &mut coarse,
+                &mut coarse_state,
+                &options,
+                SETTLE,
+                "settle",
+                &mut all,
+                watch,
+            )?;
         }
         carried = Some((coarse, coarse_state));
+        if all.cancelled {
+            break;
+        }
     }
+    // a drape that was stopped while it sewed goes on with that
+    let open = engine.system.largest_seam_gap(&state.positions) > NEARLY_CLOSED;
     match &carried {
         Some((from, positions)) => transfer(from, positions, engine, state)?,
-        None if flat && !sew(engine, state, plan, &mut all, watch)? => return Ok(all),
+        None if flat || open => {
+            sew(engine, state, plan, &mut all, watch)?;
+        }
         None => {}
+    }
+    if all.cancelled {
+        return stopped(engine, state, all);
     }
     if !flat && tangled(&engine.system, state) {
         let done = unfold(engine, state, plan, &mut all, watch);
@@ -114,7 +122,7 @@ pub fn drape(
         let done = done?;
         restored?;
         if done.cancelled {
-            return Ok(all);
+            return stopped(engine, state, all);
         }
     }
     let options = settle_options(plan, plan.force_tolerance);
@@ -136,7 +144,18 @@ pub fn drape(
             break;
         }
     }
+    if all.converged {
+        state.velocities.fill(Vec3::zeros());
+        Ok(all)
+    } else {
+        stopped(engine, state, all)
+    }
+}
+
+/// The end of a drape before rest, with the residual of the state that it leaves.
+fn stopped(engine: &mut Engine, state: &mut State, mut all: Relaxed) -> Result<Relaxed> {
     state.velocities.fill(Vec3::zeros());
+    all.totals.residual = engine.residual(state)?;
     Ok(all)
 }
 
