@@ -61,7 +61,7 @@ const CLOSED: f64 = 1e-3;
 /// Watches progress: fraction done, stage, residual; false stops.
 pub type Watch<'a> = dyn FnMut(f64, &'static str, f64) -> bool + 'a;
 
-/// Sews (if the garment is `flat`, as placed) and drapes, coarse levels first.
+/// Sews (if the garment is `flat`, as placed, or its seams are open) and drapes, coarse levels first.
 pub fn drape(
     engine: &mut Engine,
     state: &mut State,
