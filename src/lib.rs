@@ -17,3 +17,4 @@ pub mod sim_scene;
 pub mod solve;
 pub mod system;
 pub mod tri;
+pub mod yarn;
