@@ -94,3 +94,5 @@ mod terms_symmetry;
 mod tri_garments;
 #[path = "tri_real.rs"]
 mod tri_real;
+#[path = "yarn_charts.rs"]
+mod yarn_charts;

@@ -62,6 +62,9 @@ fn json_type(kind: &str) -> Value {
         "text" => json!({"type": "string"}),
         "boolean" => json!({"type": "boolean"}),
         "object" => json!({"type": "object"}),
+        "text or array of text" => {
+            json!({"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]})
+        }
         "text or integer" => json!({"type": ["string", "integer"]}),
         "[u, v]" => vector(2, "number"),
         "[x, y, z]" => vector(3, "number"),
