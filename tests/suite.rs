@@ -13,6 +13,7 @@ mod self_contact_cases;
 mod sheets;
 mod terms_cases;
 mod tri_common;
+mod yarn_common;
 
 #[path = "abi.rs"]
 mod abi;
@@ -96,3 +97,9 @@ mod tri_garments;
 mod tri_real;
 #[path = "yarn_charts.rs"]
 mod yarn_charts;
+#[path = "yarn_garments.rs"]
+mod yarn_garments;
+#[path = "yarn_knit.rs"]
+mod yarn_knit;
+#[path = "yarn_weave.rs"]
+mod yarn_weave;

@@ -5,6 +5,7 @@
 
 pub mod crossings;
 pub mod export;
+pub mod flat_yarns;
 pub mod palette;
 pub mod picture;
 pub mod plot;

@@ -5,8 +5,19 @@
 //! through it, the yarn's material coordinate `u` there, its arc length at rest. A yarn is the
 //! ordered list of its incidences. Everything here is rest data; what moves is in the State.
 
+mod builder;
+mod check;
+mod cut;
+mod knit;
+pub mod layout;
 pub mod material;
+mod piece;
+mod region;
+mod rods;
+mod stitch;
+mod weave;
 
+pub use layout::{Cell, Layout, lay};
 pub use material::YarnMaterial;
 
 use crate::math::Vec2;
