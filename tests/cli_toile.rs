@@ -389,3 +389,53 @@ fn a_real_pattern_on_a_real_body_is_built() {
         "{all}"
     );
 }
+
+#[test]
+fn yarns_are_laid_counted_and_drawn() {
+    let folder = Folder::new("yarns");
+    let mut scene = scene();
+    let garment = &mut scene["garment"];
+    garment["fabrics"] = json!([{"yarns": {
+        "weave": "twill 2/2", "warp_pitch": 0.01, "radius": 0.002,
+    }}]);
+    let file = folder.write("woven.json", &scene.to_string());
+    let svg = folder.0.join("yarns.svg");
+    let args = [
+        "yarns",
+        file.to_str().unwrap(),
+        "--out",
+        svg.to_str().unwrap(),
+    ];
+    let output = toile(&args);
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    // 30 x 30 crossings, two ends to each of 60 yarns
+    let printed = text(&output.stdout);
+    let has = |name: &str, count: usize| {
+        let row = format!("{name:<22} {count}\n");
+        assert!(printed.contains(&row), "{printed}");
+    };
+    has("nodes", 900 + 120);
+    has("yarns", 60);
+    has("corners", 3600);
+    assert!(std::fs::read_to_string(&svg).unwrap().contains("<svg"));
+    // no yarns, and too coarse ones
+    let bare = folder.write("bare.json", &self::scene().to_string());
+    let output = toile(&[
+        "yarns",
+        bare.to_str().unwrap(),
+        "--out",
+        svg.to_str().unwrap(),
+    ]);
+    assert_eq!(code(&output), 1);
+    assert!(text(&output.stderr).contains("no fabric has yarns"));
+    scene["garment"]["fabrics"][0]["yarns"]["radius"] = json!(0.02);
+    let file = folder.write("coarse.json", &scene.to_string());
+    let output = toile(&[
+        "yarns",
+        file.to_str().unwrap(),
+        "--out",
+        svg.to_str().unwrap(),
+    ]);
+    assert_eq!(code(&output), 1);
+    assert!(text(&output.stderr).contains("two radii"));
+}

@@ -2,7 +2,9 @@
 
 use crate::common_data::data_dir;
 use crate::sheets::Random;
-use crate::yarn_common::{garment, knit, knit_of, laid, patch, random_panel, rectangle, u};
+use crate::yarn_common::{
+    assert_no_short_segment, garment, knit, knit_of, laid, patch, random_panel, rectangle, u,
+};
 use std::time::Instant;
 use toile::error::Status;
 use toile::math::{Vec2, Vec3};
@@ -301,6 +303,9 @@ fn a_yarn_over_opens_a_hole_and_an_increase_shares_its_head() {
     for grid in [".w.__\n.....", "_.v._\n_....", "oo/\\o\n....."] {
         laid(&once(chart(grid), 5, 2));
     }
+    // the room between two feet in one head, and between two such heads
+    let tight = laid(&once(chart("vv.v_____\n.vv...v__"), 10, 2));
+    assert_no_short_segment(&tight, 0.05 * 3e-3);
     // yarn-overs at both edges
     laid(&patch(knit(chart("o/..\\o\n......")), 6, 6));
 }
@@ -323,6 +328,7 @@ fn every_chart_of_the_data_is_laid() {
             continue;
         };
         println!("{name}: {:?}", mesh.counts());
+        assert_no_short_segment(&mesh, 0.09 * 3e-3);
         assert_eq!(mesh.yarn_count(), 1, "{name}");
         let deepest = (0..mesh.uv.len()).map(|k| mesh.stack(k).len()).max();
         let stacked = ["lace", "blue", "feather", "diamond"]

@@ -280,3 +280,16 @@ fn too_many_nodes_are_refused_before_they_are_laid() {
     };
     assert_eq!(lay(&small, &layout).unwrap_err().status, Status::Limit);
 }
+
+#[test]
+fn a_panel_that_holds_no_yarn_is_refused() {
+    for size in [
+        Vec2::new(1.5 * PITCH, 0.02),
+        Vec2::new(0.5 * PITCH, 0.5 * PITCH),
+    ] {
+        let garment = garment(rectangle(size), weave(mask("plain"), [PITCH; 2], RADIUS));
+        let error = lay(&garment, &Layout::default()).unwrap_err();
+        assert_eq!(error.status, Status::Geometry);
+        assert!(error.message.contains("'panel': too small"), "{error}");
+    }
+}

@@ -82,8 +82,8 @@ fn foot(k: usize, m: usize) -> [[f64; 2]; 4] {
     if m == 1 {
         return FOOT;
     }
-    // the head is widened to 1.1; between two feet the yarn crosses the head, not its legs
-    let gap = 0.55 / (0.5 * (m - 1) as f64 + 0.6);
+    // the head is widened to 0.92, so that two of them have room beside each other; between two feet the yarn crosses the head, not its legs
+    let gap = 0.46 / (0.5 * (m - 1) as f64 + 0.6);
     let middle = (k as f64 - 0.5 * (m - 1) as f64) * gap;
     let outer = |last: bool| {
         if last {

@@ -146,6 +146,7 @@ pub fn lay(garment: &Garment, layout: &Layout<'_>) -> Result<YarnMesh> {
         let yarns = yarns_of(garment, p)?;
         let cell = layout.cell(fabric);
         let (index, panel) = (fabric as u32, p as u32);
+        let before = builder.mesh.yarn_count();
         match &yarns.structure {
             Structure::Woven(woven) => {
                 weave::lay(
@@ -170,6 +171,12 @@ pub fn lay(garment: &Garment, layout: &Layout<'_>) -> Result<YarnMesh> {
                 )
                 .map_err(place)?;
             }
+        }
+        if builder.mesh.yarn_count() == before {
+            let [a, b] = yarns.structure.pitch();
+            return Err(place(Error::geometry(format!(
+                "too small for yarns {a} and {b} m apart: none is held by two others"
+            ))));
         }
     }
     rods::sew(&mut builder, garment, &panels)?;

@@ -126,6 +126,16 @@ pub(crate) fn garment(panel: Panel, yarns: YarnFabric) -> Garment {
     garment
 }
 
+/// No segment of a finished patch is so short that it would collapse at once.
+pub(crate) fn assert_no_short_segment(mesh: &YarnMesh, least: f64) {
+    for y in 0..mesh.yarn_count() {
+        for w in mesh.yarn(y).windows(2) {
+            let du = w[1].u - w[0].u;
+            assert!(du > least, "{du} m");
+        }
+    }
+}
+
 /// A finished patch of so many loops.
 pub(crate) fn patch(yarns: YarnFabric, wales: usize, courses: usize) -> Garment {
     let size = knit_of(&yarns).size(wales, courses);
