@@ -2,6 +2,9 @@
 
 use crate::common_data::data_dir;
 use crate::sheets::Random;
+use crate::yarn_common::{garment, laid, rectangle};
+use std::path::Path;
+use toile::math::Vec2;
 use toile::pattern::chart::{Chart, Face, Notation, Stack, Stitch};
 use toile::pattern::export::{fabric_to_json, garment_to_json};
 use toile::pattern::import::{fabric_from_json, garment_from_json};
@@ -357,4 +360,26 @@ fn yarn_numbers_are_those_of_the_energies() {
     assert!(near(m.density, 750.0 * area) && near(m.shear, 1e3 * 7.5e-4 * 7.5e-4));
     // the published rigidity of the sweater's yarn, and its mass by the packing rule
     assert!((m.bending - 1.8e-9).abs() < 0.05e-9 && (m.density - 1.3e-3).abs() < 0.05e-3);
+}
+
+#[test]
+fn fabrics_of_the_documentation_are_read_and_laid() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/yarns.md");
+    let text = std::fs::read_to_string(path).unwrap();
+    let mut seen = 0;
+    for block in text.split("```json\n").skip(1) {
+        let json = block.split("```").next().unwrap();
+        let yarns = fabric_from_json(json).unwrap().0.yarns.unwrap();
+        laid(&garment(rectangle(Vec2::new(0.08, 0.06)), yarns));
+        seen += 1;
+    }
+    assert_eq!(seen, 5);
+    // every symbol stands in the table
+    for symbol in toile::pattern::chart::grid::symbols() {
+        assert!(
+            text.contains(&format!("`{}`", symbol.sign)),
+            "{}",
+            symbol.name
+        );
+    }
 }

@@ -435,3 +435,46 @@ fn a_million_nodes_are_laid() {
     assert!(counts.nodes > 1_000_000);
     assert!(counts.bytes < 250 * counts.nodes);
 }
+
+#[test]
+fn random_proportions_and_charts_are_laid() {
+    let mut random = Random::new(8);
+    let grids = [
+        ".",
+        "-.\n.-",
+        "..--",
+        "o..../\\....o\n............",
+        "oo5oo\n.....",
+        "o<o\n...",
+        "ov_^.\n.....",
+        "m.a.o\n.....",
+        "u_pq.o.\n.......",
+    ];
+    for k in 0..90 {
+        let mut yarns = knit(chart(grids[k % grids.len()]));
+        let mut next = |low: f64, high: f64| low + (high - low) * 0.5 * (1.0 + random.signed());
+        let (width, height) = (next(2e-3, 6e-3), next(0.45, 1.6));
+        yarns.radius = width * next(0.05, 0.2249);
+        if let Structure::Knitted(knit) = &mut yarns.structure {
+            knit.loop_width = width;
+            knit.loop_height = height * width;
+        }
+        let room = [next(15.0, 30.0) * width, next(8.0, 20.0) * width];
+        let mut panel = rectangle(Vec2::new(room[0], room[1]));
+        if k % 2 == 1 {
+            panel = random_panel(&mut random, 30.0 * width);
+        }
+        let mesh = laid(&garment(panel, yarns));
+        let held = mesh.stitch_springs.len();
+        assert!(
+            held > 100 && mesh.wraps.len() > held / 4,
+            "{:?}",
+            mesh.counts()
+        );
+        assert!(
+            mesh.spacings
+                .iter()
+                .all(|s| s.least <= 0.95 * s.length * (1.0 + 1e-9))
+        );
+    }
+}
