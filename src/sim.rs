@@ -105,6 +105,10 @@ impl Sim {
             gravity: Vec3::from(gravity),
             wind: Vec3::from(options.wind),
             pressure: options.pressure,
+            u: Vec::new(),
+            u_rates: Vec::new(),
+            strands: Vec::new(),
+            yarn_normals: Vec::new(),
         };
         Ok(Self {
             garment: garment.clone(),

@@ -59,6 +59,10 @@ fn case() -> (Cloth, Case) {
         gravity: Vec3::zeros(),
         wind: Vec3::zeros(),
         pressure: 0.0,
+        u: Vec::new(),
+        u_rates: Vec::new(),
+        strands: Vec::new(),
+        yarn_normals: Vec::new(),
     };
     let workers = toile::math::parallel::Workers::new(1);
     bodies.prepare(&state, 1.0, &workers).expect("prepare");
@@ -69,6 +73,7 @@ fn configuration<'a>(x: &'a [Vec3], x0: &'a [Vec3], world: &'a World<'a>) -> Con
     Configuration {
         x,
         x0,
+        u: &[],
         inv_dt: 0.0,
         world,
     }
@@ -169,6 +174,7 @@ fn wrench_on_a_body_is_the_reaction_of_the_cloth() {
     let at = Configuration {
         x: &case.x,
         x0: &case.x,
+        u: &[],
         inv_dt: 0.0,
         world: &world,
     };

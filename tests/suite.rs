@@ -13,6 +13,7 @@ mod self_contact_cases;
 mod sheets;
 mod terms_cases;
 mod tri_common;
+mod yarn_cases;
 
 #[path = "abi.rs"]
 mod abi;
@@ -94,3 +95,11 @@ mod terms_symmetry;
 mod tri_garments;
 #[path = "tri_real.rs"]
 mod tri_real;
+#[path = "yarn_contacts.rs"]
+mod yarn_contacts;
+#[path = "yarn_laws.rs"]
+mod yarn_laws;
+#[path = "yarn_terms_fd.rs"]
+mod yarn_terms_fd;
+#[path = "yarn_terms_symmetry.rs"]
+mod yarn_terms_symmetry;

@@ -53,6 +53,10 @@ fn state(positions: &[Vec3]) -> State {
         gravity: Vec3::zeros(),
         wind: Vec3::zeros(),
         pressure: 0.0,
+        u: Vec::new(),
+        u_rates: Vec::new(),
+        strands: Vec::new(),
+        yarn_normals: Vec::new(),
     }
 }
 
@@ -65,6 +69,7 @@ fn weight_pressure_and_wind_add_up_to_their_resultants() {
     let at = Configuration {
         x: &x,
         x0: &x,
+        u: &[],
         inv_dt: 0.0,
         world: &w,
     };
@@ -140,6 +145,7 @@ fn an_open_seam_pulls_with_a_bounded_force_and_a_sewn_one_holds() {
         let at = Configuration {
             x,
             x0: x,
+            u: &[],
             inv_dt: 0.0,
             world: &w,
         };
@@ -161,6 +167,7 @@ fn an_open_seam_pulls_with_a_bounded_force_and_a_sewn_one_holds() {
     let at = Configuration {
         x: &open,
         x0: &open,
+        u: &[],
         inv_dt: 0.0,
         world: &w,
     };
@@ -193,6 +200,7 @@ fn the_angle_across_a_seam_acts_when_it_is_closed() {
         let at = Configuration {
             x: &folded,
             x0: &folded,
+            u: &[],
             inv_dt: 0.0,
             world: &w,
         };
@@ -201,6 +209,7 @@ fn the_angle_across_a_seam_acts_when_it_is_closed() {
     let at = Configuration {
         x: &shut,
         x0: &shut,
+        u: &[],
         inv_dt: 0.0,
         world: &w,
     };

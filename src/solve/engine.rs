@@ -178,6 +178,7 @@ impl Engine {
             let at = Configuration {
                 x: &self.start,
                 x0: &self.start,
+                u: &[],
                 inv_dt,
                 world: &world,
             };
@@ -247,6 +248,7 @@ impl Engine {
             let at = Configuration {
                 x: &x,
                 x0: &self.start,
+                u: &[],
                 inv_dt,
                 world: &world,
             };
@@ -258,6 +260,7 @@ impl Engine {
         let at = Configuration {
             x: &x,
             x0: &self.start,
+            u: &[],
             inv_dt,
             world: &world,
         };
@@ -346,6 +349,7 @@ impl Engine {
         let at = Configuration {
             x: &state.positions,
             x0: &state.positions,
+            u: &[],
             inv_dt: 0.0,
             world: &world,
         };

@@ -101,6 +101,7 @@ impl Problem<'_> {
         Configuration {
             x,
             x0: self.x0,
+            u: &[],
             inv_dt: self.inv_dt,
             world: self.world,
         }

@@ -11,7 +11,7 @@ use crate::math::Vec3;
 use crate::math::hash::Hash;
 
 const MAGIC: &[u8; 8] = b"TOILESNP";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 const HEADER: usize = 8 + 4 + 8 + 8;
 
 /// A number that two systems share only if their meshes and fabrics are the same.
@@ -108,7 +108,28 @@ fn check(state: &State, like: &State) -> std::result::Result<(), String> {
             like.bodies.len()
         ));
     }
+    if state.u.len() != like.u.len()
+        || state.u_rates.len() != like.u.len()
+        || state.strands.len() != like.strands.len()
+        || state.yarn_normals.len() != like.yarn_normals.len()
+    {
+        return Err(format!(
+            "{} passages of yarns in {} strands, {} in {} are expected",
+            state.u.len(),
+            state.strands.len(),
+            like.u.len(),
+            like.strands.len()
+        ));
+    }
     let fine = |v: &Vec3| v.iter().all(|c| c.is_finite());
+    let yarns_fine = state.u.iter().chain(&state.u_rates).all(|u| u.is_finite())
+        && state.yarn_normals.iter().all(fine)
+        && state.strands.iter().all(|s| {
+            s.anchor.is_finite()
+                && s.beside.is_finite()
+                && s.contact.is_finite()
+                && s.contact >= 0.0
+        });
     let bodies_fine = state.bodies.iter().all(|b| {
         fine(&b.pose.position)
             && fine(&b.target.position)
@@ -138,6 +159,7 @@ fn check(state: &State, like: &State) -> std::result::Result<(), String> {
         && fine(&state.wind)
         && state.pressure.is_finite();
     if !(bodies_fine
+        && yarns_fine
         && anchors_fine
         && pins_fine
         && numbers_fine

@@ -29,6 +29,27 @@ pub struct State {
     pub wind: Vec3,
     /// Pressure along the cloth's normal [Pa].
     pub pressure: f64,
+    /// Material coordinate of each passage of a yarn through a node [m]; empty without yarns.
+    pub u: Vec<f64>,
+    /// Their rates [m/s].
+    pub u_rates: Vec<f64>,
+    /// What each strand of the stacks has of friction.
+    pub strands: Vec<StrandState>,
+    /// Normal of each node with several yarns, from the back to the front; zero elsewhere and before
+    /// it is known.
+    pub yarn_normals: Vec<Vec3>,
+}
+
+/// Friction of a strand at a node, carried from step to step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct StrandState {
+    /// Anchor of its material coordinate [m].
+    pub anchor: f64,
+    /// Anchor of its material coordinate less that of the next strand in the stack, where the two
+    /// lie beside each other [m].
+    pub beside: f64,
+    /// Normal force with the next strand in the stack in the last accepted step [N].
+    pub contact: f64,
 }
 
 /// A vertex held at a place.

@@ -42,6 +42,9 @@ pub struct Configuration<'a> {
     pub x: &'a [Vec3],
     /// Positions at the start of the step [m].
     pub x0: &'a [Vec3],
+    /// Material coordinate of every passage of a yarn at the start of the step [m]: the value of
+    /// those that do not slide now. Empty without yarns.
+    pub u: &'a [f64],
     /// One over the step size [1/s]; 0 in statics, where rate terms vanish.
     pub inv_dt: f64,
     /// The world at the end of the step.

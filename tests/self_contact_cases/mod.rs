@@ -41,6 +41,7 @@ pub(crate) fn at<'a>(x: &'a [Vec3], x0: &'a [Vec3], dt: f64) -> Configuration<'a
     Configuration {
         x,
         x0,
+        u: &[],
         inv_dt: 1.0 / dt,
         world: &WORLD,
     }
@@ -124,6 +125,10 @@ pub(crate) fn state(positions: Vec<Vec3>) -> State {
         gravity: WORLD.gravity,
         wind: Vec3::zeros(),
         pressure: 0.0,
+        u: Vec::new(),
+        u_rates: Vec::new(),
+        strands: Vec::new(),
+        yarn_normals: Vec::new(),
     }
 }
 

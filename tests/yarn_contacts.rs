@@ -1,0 +1,507 @@
+//! Compression, friction and slip of yarns at their contacts.
+
+use crate::sheets::Random;
+use crate::yarn_cases::{BEFORE, Cloth, MATERIAL, P, WORLD, cloth, lay, stitch, weave};
+use nalgebra::{DMatrix, DVector};
+use std::f64::consts::{FRAC_PI_2, PI};
+use toile::math::parallel::Workers;
+use toile::math::{Rotation, Vec2, Vec3};
+use toile::system::state::{State, StrandState};
+use toile::system::term::{Configuration, HessianKind, Term};
+use toile::system::yarn::compression::{Compression, YarnPlace};
+use toile::system::yarn::slip::{SlipRule, set_anchors, sliding};
+use toile::system::yarn::springs::frictions;
+use toile::system::yarn::stack::{StackRule, held_normal_forces, normal_forces};
+use toile::system::yarn::unknowns::Unknowns;
+use toile::system::yarn::{YarnOptions, terms};
+use toile::yarn::{Family, YarnMaterial, YarnMesh};
+
+fn pressed(
+    compression: &mut Compression,
+    mesh: &YarnMesh,
+    x: &[Vec3],
+    u: &[f64],
+    held: &[bool],
+    normals: &mut [Vec3],
+) -> Vec<StrandState> {
+    let mut strands = vec![StrandState::default(); mesh.stacks.len()];
+    let place = YarnPlace {
+        x,
+        u,
+        held,
+        gravity: Vec3::zeros(),
+    };
+    compression.update(&place, &Workers::default(), normals, &mut strands);
+    strands
+}
+
+/// The forces of a stack are the best of all active sets, for up to five yarns; equation 4 of the paper is
+/// not for three and more.
+#[test]
+fn normal_forces_are_the_non_negative_least_squares() {
+    let mut lambda = [0.0; 2];
+    // r = (1, -5)
+    normal_forces(&[0.0, -1.0, 4.0], StackRule::LeastSquares, &mut lambda);
+    assert!((lambda[0] - 0.5).abs() < 1e-15 && lambda[1] == 0.0);
+    normal_forces(&[0.0, -1.0, 4.0], StackRule::ClosedForm, &mut lambda);
+    assert!((lambda[0] - 2.0 / 3.0).abs() < 1e-15 && (lambda[1] - 1.0 / 3.0).abs() < 1e-15);
+    let mut random = Random::new(2);
+    let mut differ = 0;
+    for k in 0..4000 {
+        let n = 2 + k % 4;
+        let b: Vec<f64> = (0..n).map(|_| random.signed()).collect();
+        let mut lambda = vec![f64::NAN; n - 1];
+        normal_forces(&b, StackRule::LeastSquares, &mut lambda);
+        let a = DMatrix::from_fn(n, n - 1, |i, j| {
+            f64::from(i8::from(i == j + 1)) - f64::from(i8::from(i == j))
+        });
+        let rest =
+            |l: &[f64]| (&a * DVector::from_row_slice(l) + DVector::from_row_slice(&b)).norm();
+        // every active set by brute force
+        let mut best = rest(&vec![0.0; n - 1]);
+        for set in 1..1_u32 << (n - 1) {
+            let columns: Vec<usize> = (0..n - 1).filter(|j| set >> j & 1 == 1).collect();
+            let part = a.select_columns(&columns);
+            let normal = part.transpose() * &part;
+            let right = -(part.transpose() * DVector::from_row_slice(&b));
+            let Some(solution) = normal.lu().solve(&right) else {
+                continue;
+            };
+            if solution.iter().all(|l| *l >= 0.0) {
+                let mut full = vec![0.0; n - 1];
+                for (j, l) in columns.iter().zip(solution.iter()) {
+                    full[*j] = *l;
+                }
+                best = best.min(rest(&full));
+            }
+        }
+        assert!(lambda.iter().all(|l| *l >= 0.0));
+        assert!((rest(&lambda) - best).abs() < 1e-12, "{b:?}: {lambda:?}");
+        let mut closed = vec![0.0; n - 1];
+        normal_forces(&b, StackRule::ClosedForm, &mut closed);
+        let same = rest(&closed) < best + 1e-9;
+        assert!(same || n > 2);
+        differ += usize::from(!same);
+    }
+    assert!(differ > 500);
+}
+
+/// A planar weave under tension presses each crossing with `4 T R / l'`: its yarns lie at `R` before and behind
+/// the plane, next to crossings of the other side. Normals point to the front of the panel and follow it.
+#[test]
+fn a_stretched_plain_weave_presses_its_crossings() {
+    let mesh = weave(5, 5);
+    let mut compression = Compression::new(
+        &mesh,
+        &[MATERIAL],
+        &YarnOptions::default(),
+        StackRule::LeastSquares,
+    )
+    .expect("rest data");
+    let u: Vec<f64> = mesh.incidences.iter().map(|i| i.u).collect();
+    let strain = 0.02;
+    let mut normals = vec![Vec3::zeros(); 25];
+    for turn in 0..4 {
+        let turn = Rotation::from_euler_angles(0.3 + f64::from(turn), -0.4, 0.7);
+        let x: Vec<Vec3> = mesh
+            .uv
+            .iter()
+            .map(|p| turn * Vec3::new(p.x, p.y, 0.0) * (1.0 + strain))
+            .collect();
+        let held = vec![false; 25];
+        let strands = pressed(&mut compression, &mesh, &x, &u, &held, &mut normals);
+        let front = turn * Vec3::z();
+        let length = (P * (1.0 + strain)).hypot(2.0 * MATERIAL.radius);
+        let expected = 4.0 * MATERIAL.stretch * strain * MATERIAL.radius / length;
+        for node in [6, 7, 8, 11, 12, 13, 16, 17, 18] {
+            assert!((normals[node] - front).norm() < 1e-9, "{node}");
+            let first = strands[mesh.stack_starts[node] as usize].contact;
+            assert!(
+                (first / expected - 1.0).abs() < 1e-9,
+                "{node}: {first} {expected}"
+            );
+            assert!(strands[mesh.stack_starts[node] as usize + 1].contact == 0.0);
+        }
+        // at rest nothing is pressed, under compression nothing pulls
+        for scale in [1.0, 0.97] {
+            let x: Vec<Vec3> = x.iter().map(|p| p * (scale / (1.0 + strain))).collect();
+            let strands = pressed(&mut compression, &mesh, &x, &u, &held, &mut normals);
+            assert!(strands.iter().all(|s| s.contact.abs() < 1e-12));
+        }
+    }
+}
+
+/// At a held node the reaction counts: one loaded yarn presses with its whole force, not with half of it.
+#[test]
+fn a_held_contact_carries_the_whole_load() {
+    let mut lambda = [0.0];
+    for b in [[0.7, 0.0], [0.0, -0.7], [0.7, -0.7]] {
+        held_normal_forces(&b, StackRule::LeastSquares, &mut lambda);
+        assert!((lambda[0] - 0.7).abs() < 1e-15);
+    }
+    normal_forces(&[0.7, 0.0], StackRule::LeastSquares, &mut lambda);
+    assert!((lambda[0] - 0.35).abs() < 1e-15);
+}
+
+/// The forces that compression sees are those of the energies: summed over the yarns of a node they are the
+/// gradient by its position; the forces along yarns are the derivatives by the material coordinates.
+#[test]
+fn forces_of_yarns_sum_to_the_gradient() {
+    for mesh in [weave(5, 4), stitch()] {
+        let cloth = cloth("", mesh, |_| true);
+        let mesh = &cloth.mesh;
+        // no yarn has a thickness: the places of the segments' ends are the nodes
+        let thin = YarnMaterial {
+            radius: 0.0,
+            ..MATERIAL
+        };
+        let mut compression = Compression::new(
+            mesh,
+            &[thin],
+            &YarnOptions::default(),
+            StackRule::LeastSquares,
+        )
+        .expect("rest data");
+        let mut random = Random::new(6);
+        let x: Vec<Vec3> = cloth
+            .laid()
+            .iter()
+            .map(|p| p + random.vec3(0.2 * P))
+            .collect();
+        let u: Vec<f64> = mesh
+            .incidences
+            .iter()
+            .map(|i| i.u + 0.1 * P * f64::from(u8::from(i.slides)) * random.signed())
+            .collect();
+        let mut normals = vec![Vec3::zeros(); x.len()];
+        let held = vec![false; x.len()];
+        pressed(&mut compression, mesh, &x, &u, &held, &mut normals);
+        let blocks = cloth.blocks(&x, &u);
+        let at = Configuration {
+            x: &blocks,
+            x0: &blocks,
+            u: &u,
+            inv_dt: 0.0,
+            world: &WORLD,
+        };
+        let elastic = ["yarn_stretch", "yarn_bending", "stitch_wrapping"];
+        let along = [
+            "yarn_stretch",
+            "yarn_bending",
+            "stitch_length",
+            "yarn_spacing",
+        ];
+        let by_place = sum(&cloth, &elastic, &at);
+        let by_u = sum(&cloth, &along, &at);
+        let mut total = vec![Vec3::zeros(); x.len()];
+        for (incidence, force) in mesh.incidences.iter().zip(compression.forces()) {
+            total[incidence.node as usize] += force;
+        }
+        let size = total.iter().map(|f| f.norm()).fold(0.0, f64::max);
+        for (n, force) in total.iter().enumerate() {
+            let g = by_place[BEFORE as usize + n];
+            assert!((force + g).norm() < 1e-12 * size, "{n}: {force} {g}");
+        }
+        for (i, force) in compression.sliding_forces().iter().enumerate() {
+            if let Some((block, c)) = cloth.unknowns.slides[i] {
+                let g = by_u[block as usize][usize::from(c)];
+                assert!((force + g).abs() < 1e-12 * size, "{i}: {force} {g}");
+            }
+        }
+    }
+}
+
+fn sum(cloth: &Cloth, names: &[&str], at: &Configuration<'_>) -> Vec<Vec3> {
+    let mut out = vec![Vec3::zeros(); at.x.len()];
+    for term in cloth.terms.iter().filter(|t| names.contains(&t.name())) {
+        add(term.as_ref(), at, &mut out);
+    }
+    out
+}
+
+fn add(term: &dyn Term, at: &Configuration<'_>, out: &mut [Vec3]) {
+    for e in 0..term.stencils().count() {
+        let g = crate::terms_cases::gradient(term, e, at);
+        for (g, &v) in g.iter().zip(term.stencils().get(e)) {
+            out[v as usize] += g;
+        }
+    }
+}
+
+/// One contact held by friction alone, moved by hand: sticking keeps the anchor, slipping draws it along at
+/// the distance of the bound, in both directions; without normal force there is no friction.
+#[test]
+fn anchors_stick_slip_and_follow() {
+    let mut cloth = cloth("", stitch(), |_| true);
+    let (x, u) = (cloth.laid(), cloth.u());
+    let mut state = cloth.state(&x, &u, 1);
+    let start = cloth.blocks(&x, &u);
+    let mut terms = std::mem::take(&mut cloth.terms);
+    let lambda = 0.02;
+    // the new yarn at q0 crosses the strand behind it; the two old yarns lie beside each other
+    let new = (0..3)
+        .find(|&s| cloth.mesh.stacks[s].incidence == 1)
+        .expect("a strand");
+    let (own, pair) = (new, 0);
+    let (reach, force) = (0.3 * lambda / MATERIAL.anchor, 0.3 * lambda);
+    for (contact, moved, kept, pull) in [
+        (lambda, 0.5 * reach, 0.0, 0.5 * force),
+        (lambda, -0.5 * reach, 0.0, -0.5 * force),
+        (lambda, 3.0 * reach, 2.0 * reach, force),
+        (lambda, -3.0 * reach, -2.0 * reach, -force),
+        (0.0, 3.0 * reach, 3.0 * reach, 0.0),
+    ] {
+        for (s, strand) in state.strands.iter_mut().enumerate() {
+            let i = cloth.mesh.stacks[s].incidence as usize;
+            *strand = StrandState {
+                anchor: u[i],
+                beside: 0.0,
+                contact,
+            };
+            if let Some(next) = cloth.mesh.stacks.get(s + 1) {
+                strand.beside = u[i] - u[next.incidence as usize];
+            }
+        }
+        // only the strand in question is moved, and for the pair only its first one
+        for (s, name) in [(own, "sliding_friction"), (pair, "parallel_friction")] {
+            let i = cloth.mesh.stacks[s].incidence as usize;
+            let mut now = u.clone();
+            now[i] += moved;
+            let blocks = cloth.blocks(&x, &now);
+            let at = Configuration {
+                x: &blocks,
+                x0: &start,
+                u: &u,
+                inv_dt: 0.0,
+                world: &WORLD,
+            };
+            let mut after = state.clone();
+            let mut g = vec![Vec3::zeros(); blocks.len()];
+            for term in terms.iter_mut().filter(|t| t.name() == name) {
+                term.begin_step(&state, &at);
+                add(term.as_ref(), &at, &mut g);
+                term.accept(&at, &mut after);
+            }
+            let (block, c) = cloth.unknowns.slides[i].expect("it slides");
+            let got = g[block as usize][usize::from(c)];
+            assert!((got - pull).abs() < 1e-12, "{name}: {got} {pull}");
+            let drawn = if s == own {
+                after.strands[s].anchor - state.strands[s].anchor
+            } else {
+                after.strands[s].beside - state.strands[s].beside
+            };
+            assert!((drawn - kept).abs() < 1e-15, "{name}: {drawn} {kept}");
+        }
+    }
+}
+
+/// A contact gains its unknown beyond the bound, keeps it within the hysteresis and while it moves, loses it at rest below;
+/// the anchor set at the beginning makes friction go on with the force that held the yarn.
+#[test]
+fn slip_begins_at_the_bound_and_ends_below_it() {
+    let mesh = weave(5, 5);
+    let all = frictions(&mesh, &[MATERIAL]).expect("frictions");
+    let cloth = cloth("", mesh.clone(), |_| true);
+    let mut state = cloth.state(&cloth.laid(), &cloth.u(), 3);
+    state.u_rates.fill(0.0);
+    for s in &mut state.strands {
+        s.contact = 0.0;
+    }
+    let node = 12;
+    let strand = mesh.stack_starts[node] as usize;
+    state.strands[strand].contact = 0.1;
+    let i = mesh.stacks[strand].incidence as usize;
+    let other = mesh.stacks[strand + 1].incidence as usize;
+    let bound = 0.3 * 0.1;
+    let rule = SlipRule::default();
+    let slides = |force: f64, present: bool, rate: f64| {
+        let mut forces = vec![0.0; mesh.incidences.len()];
+        (forces[i], forces[other]) = (force, force);
+        let mut before = vec![false; mesh.incidences.len()];
+        (before[i], before[other]) = (present, present);
+        let mut state = state.clone();
+        (state.u_rates[i], state.u_rates[other]) = (rate, rate);
+        let out = sliding(&mesh, &all, &state, &forces, &before, &rule);
+        assert_eq!(
+            out[i], out[other],
+            "both yarns of a crossing are held by its force"
+        );
+        assert!((0..out.len()).all(|k| !out[k] || k == i || k == other));
+        out[i]
+    };
+    for sign in [1.0, -1.0] {
+        assert!(!slides(sign * 0.99 * bound, false, 0.0));
+        assert!(slides(sign * 1.01 * bound, false, 0.0));
+        assert!(slides(sign * 0.9 * bound, true, 0.0));
+        assert!(!slides(sign * 0.7 * bound, true, 0.0));
+        assert!(slides(sign * 0.7 * bound, true, 1e-3));
+    }
+    // ends of yarns never slide
+    let forces = vec![1.0; mesh.incidences.len()];
+    let none = vec![false; mesh.incidences.len()];
+    let free = sliding(&mesh, &all, &state, &forces, &none, &rule);
+    assert!(
+        mesh.incidences
+            .iter()
+            .zip(&free)
+            .all(|(p, f)| p.slides == *f)
+    );
+    let mut forces = vec![0.0; mesh.incidences.len()];
+    (forces[i], forces[other]) = (0.6 * bound, 1.5 * bound);
+    set_anchors(&mesh, &all, &forces, &none, &free, &mut state);
+    let off = |s: usize, i: usize| MATERIAL.anchor * (state.u[i] - state.strands[s].anchor);
+    assert!((off(strand, i) - 0.6 * bound).abs() < 1e-12);
+    assert!((off(strand + 1, other) - bound).abs() < 1e-12);
+}
+
+/// A yarn pulled over `n` held pegs: the tension grows at each by `(1 + mu s)/(1 - mu s)`, `s = sin(t/2)`, in the
+/// limit by `exp(mu Theta)`.
+#[test]
+fn a_yarn_over_pegs_obeys_the_capstan_equation() {
+    for (n, friction, around, printed) in [(12, 0.3, PI, 2.561), (6, 0.5, FRAC_PI_2, 2.191)] {
+        let ratio = capstan(n, friction, around);
+        let s = (0.5 * around / n as f64).sin();
+        let exact = ((1.0 + friction * s) / (1.0 - friction * s)).powi(n as i32);
+        println!(
+            "capstan {n} pegs: {ratio:.4}, {exact:.4}, limit {:.4}",
+            (friction * around).exp()
+        );
+        assert!((exact - printed).abs() < 2e-3);
+        assert!((ratio / exact - 1.0).abs() < 3e-3, "{ratio} {exact}");
+    }
+}
+
+fn capstan(n: usize, friction: f64, around: f64) -> f64 {
+    // flat: the yarn along the first axis, a peg across it at each inner node
+    let ends = n + 2;
+    let mut uv: Vec<Vec2> = (0..ends).map(|k| Vec2::new(k as f64 * P, 0.0)).collect();
+    let mut yarns = vec![(Family::Weft, (0..ends as u32).collect::<Vec<u32>>())];
+    for k in 1..=n {
+        let first = uv.len() as u32;
+        uv.push(Vec2::new(k as f64 * P, -P));
+        uv.push(Vec2::new(k as f64 * P, P));
+        yarns.push((Family::Warp, vec![first, k as u32, first + 1]));
+    }
+    let mesh = lay(uv, &yarns, |node| match node {
+        k if k >= 1 && k <= n => vec![(k, 1), (0, 0)],
+        _ => vec![],
+    });
+    let material = YarnMaterial {
+        radius: 0.0,
+        bending: 0.0,
+        friction,
+        anchor: 1000.0,
+        ..MATERIAL
+    };
+    // in space: segments of equal length that turn by the same angle at each peg, outwards up
+    let mut x = vec![Vec3::zeros(); mesh.uv.len()];
+    let mut direction = 0.5 * around;
+    for k in 1..ends {
+        let (s, c) = direction.sin_cos();
+        x[k] = x[k - 1] + Vec3::new(c, 0.0, s) * P;
+        direction -= around / n as f64;
+    }
+    for k in 1..=n {
+        x[ends + 2 * k - 2] = x[k] - Vec3::y() * P;
+        x[ends + 2 * k - 1] = x[k] + Vec3::y() * P;
+    }
+    let sliding: Vec<bool> = (0..mesh.incidences.len())
+        .map(|i| i >= 1 && i <= n)
+        .collect();
+    let first_slide = mesh.uv.len() as u32;
+    let unknowns = Unknowns::new(&mesh, 0, first_slide, &sliding).expect("unknowns");
+    let options = YarnOptions::default();
+    let mut terms = terms(&mesh, &[material], &unknowns, &options).expect("terms");
+    terms.retain(|t| ["yarn_stretch", "sliding_friction"].contains(&t.name()));
+    let mut compression =
+        Compression::new(&mesh, &[material], &options, StackRule::LeastSquares).expect("rest data");
+    let mut u: Vec<f64> = mesh.incidences.iter().map(|i| i.u).collect();
+    let tension = 0.002;
+    let strain = tension / material.stretch;
+    u[..ends].iter_mut().for_each(|u| *u /= 1.0 + strain);
+    let mut state: State = crate::yarn_cases::empty(Vec::new());
+    state.strands = vec![StrandState::default(); mesh.stacks.len()];
+    for (s, strand) in mesh.stacks.iter().enumerate() {
+        state.strands[s].anchor = u[strand.incidence as usize];
+    }
+    let mut normals = vec![Vec3::zeros(); x.len()];
+    let held = vec![true; x.len()];
+    let pull = |u: &[f64], k: usize| material.stretch * (P / (u[k + 1] - u[k]) - 1.0);
+    for _ in 0..400 {
+        let place = YarnPlace {
+            x: &x,
+            u: &u,
+            held: &held,
+            gravity: Vec3::zeros(),
+        };
+        compression.update(
+            &place,
+            &Workers::default(),
+            &mut normals,
+            &mut state.strands,
+        );
+        u[ends - 1] -= 2e-7;
+        u[0] = u[1] - P / (1.0 + strain);
+        let start = blocks(&x, &u, &unknowns);
+        state.velocities = vec![Vec3::zeros(); start.len()];
+        state.u_rates = vec![0.0; u.len()];
+        for _ in 0..50 {
+            let now = blocks(&x, &u, &unknowns);
+            let at = Configuration {
+                x: &now,
+                x0: &start,
+                u: &u,
+                inv_dt: 0.0,
+                world: &WORLD,
+            };
+            let (mut g, mut h) = (vec![Vec3::zeros(); now.len()], DMatrix::zeros(n, n));
+            for term in &mut terms {
+                term.begin_step(&state, &at);
+                add(term.as_ref(), &at, &mut g);
+                for e in 0..term.stencils().count() {
+                    let m = crate::terms_cases::hessian(term.as_ref(), e, &at, HessianKind::Exact);
+                    let v = term.stencils().get(e);
+                    for (a, &i) in v.iter().enumerate() {
+                        for (b, &j) in v.iter().enumerate() {
+                            if i >= first_slide && j >= first_slide {
+                                let at = |b: u32| (b - first_slide) as usize;
+                                h[(at(i), at(j))] += m[(3 * a, 3 * b)];
+                            }
+                        }
+                    }
+                }
+            }
+            let r = DVector::from_fn(n, |k, _| -g[first_slide as usize + k].x);
+            let d = h.cholesky().expect("definite").solve(&r);
+            for k in 0..n {
+                u[k + 1] += d[k];
+            }
+            if d.amax() < 1e-14 {
+                break;
+            }
+        }
+        let now = blocks(&x, &u, &unknowns);
+        let at = Configuration {
+            x: &now,
+            x0: &start,
+            u: &u,
+            inv_dt: 0.0,
+            world: &WORLD,
+        };
+        for term in &mut terms {
+            term.accept(&at, &mut state);
+        }
+    }
+    pull(&u, n) / pull(&u, 0)
+}
+
+fn blocks(x: &[Vec3], u: &[f64], unknowns: &Unknowns) -> Vec<Vec3> {
+    let mut out = x.to_vec();
+    out.resize(x.len() + unknowns.slide_blocks(), Vec3::zeros());
+    for (slide, u) in unknowns.slides.iter().zip(u) {
+        if let Some((block, c)) = slide {
+            out[*block as usize][usize::from(*c)] = *u;
+        }
+    }
+    out
+}
