@@ -6,6 +6,7 @@ use nalgebra::{DMatrix, DVector};
 use std::f64::consts::{FRAC_PI_2, PI};
 use toile::math::parallel::Workers;
 use toile::math::{Rotation, Vec2, Vec3};
+use toile::system::snapshot::{read, write};
 use toile::system::state::{State, StrandState};
 use toile::system::term::{Configuration, HessianKind, Term};
 use toile::system::yarn::compression::{Compression, YarnPlace};
@@ -504,4 +505,31 @@ fn blocks(x: &[Vec3], u: &[f64], unknowns: &Unknowns) -> Vec<Vec3> {
         }
     }
     out
+}
+
+/// Material coordinates, rates, anchors and normals are part of a snapshot, and bytes that cannot be are refused.
+#[test]
+fn snapshots_hold_what_slides() {
+    let cloth = cloth("", weave(4, 4), |_| true);
+    let state = cloth.state(&cloth.laid(), &cloth.u(), 2);
+    // infinity is no number of a file
+    let state = State {
+        step_size: 1.0,
+        ..state
+    };
+    let bytes = write(&state, 7).expect("bytes");
+    assert_eq!(read(&bytes, 7, &state).expect("the state"), state);
+    let spoil: [fn(&mut State); 5] = [
+        |s| s.u[3] = f64::NAN,
+        |s| s.u_rates.push(0.0),
+        |s| s.strands[2].contact = -1.0,
+        |s| s.strands[2].beside = f64::INFINITY,
+        |s| s.yarn_normals[1].x = f64::NAN,
+    ];
+    for change in spoil {
+        let mut bad = state.clone();
+        change(&mut bad);
+        let bytes = write(&bad, 7).expect("bytes");
+        assert!(read(&bytes, 7, &state).is_err());
+    }
 }

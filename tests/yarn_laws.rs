@@ -2,7 +2,7 @@
 
 use crate::sheets::Random;
 use crate::terms_cases::gradient;
-use crate::yarn_cases::{MATERIAL, P, WORLD, cloth, lay, weave};
+use crate::yarn_cases::{MATERIAL, P, WORLD, cloth, lay, stitch, weave};
 use nalgebra::{SMatrix, SVector};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use toile::math::{Vec2, Vec3};
@@ -240,5 +240,43 @@ fn shear_locks_where_yarns_touch() {
         assert!((stiffness(sign * (angle + 0.15)) / 9e-5 - 1.0).abs() < 1e-6);
         let small = moment(sign * 1e-3) / (9e-8 * 1e-3 * sign);
         assert!((small - 1.0).abs() < 1e-9);
+    }
+}
+
+/// In the flat fabric no contact is wrapped. Unwrapping the left contact of a knit stitch drives the wings along the
+/// wales to the front and those along the courses to the back; so does the right contact, its mirror image, with
+/// the other handedness; a purl stitch does the reverse.
+#[test]
+fn stitches_unwrap_legs_to_the_front_and_heads_to_the_back() {
+    for mirrored in [1.0, -1.0] {
+        for purl in [1.0, -1.0] {
+            let mut mesh = stitch();
+            mesh.uv.iter_mut().for_each(|p| p.x *= mirrored);
+            for wrap in &mut mesh.wraps {
+                wrap.sign *= mirrored * purl;
+            }
+            let cloth = cloth("", mesh, |_| false);
+            let u = cloth.u();
+            let flat = |p: &Vec2| Vec3::new(p.x, p.y, 0.0);
+            let x = cloth.blocks(&cloth.mesh.uv.iter().map(flat).collect::<Vec<_>>(), &u);
+            let mut force = vec![Vec3::zeros(); x.len()];
+            let at = at(&x, &u);
+            for term in cloth.terms.iter().filter(|t| t.name() == "stitch_wrapping") {
+                for e in 0..term.stencils().count() {
+                    let v = term.stencils().get(e);
+                    let g = gradient(term.as_ref(), e, &at);
+                    g.iter().zip(v).for_each(|(g, &v)| force[v as usize] -= g);
+                    // the energy of the flat contact is that of a quarter turn, but for the guard
+                    let quarter =
+                        0.5 * MATERIAL.wrapping * cloth.mesh.wraps[e].length * FRAC_PI_2.powi(2);
+                    let part = term.value(e, &at) / quarter;
+                    assert!((0.7..=1.0 + 1e-12).contains(&part), "{part}");
+                }
+            }
+            let out = |node: usize| force[crate::yarn_cases::BEFORE as usize + node].z * purl;
+            // legs up and down, then sinker and head
+            assert!(out(2) > 0.0 && out(5) > 0.0, "{} {}", out(2), out(5));
+            assert!(out(3) < 0.0 && out(4) < 0.0, "{} {}", out(3), out(4));
+        }
     }
 }

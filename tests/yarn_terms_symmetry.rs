@@ -2,9 +2,11 @@
 //! sliding unknowns or constants give the same forces; no state gives anything but numbers.
 
 use crate::terms_cases::{gradient, hessian, rounding, sample};
-use crate::yarn_cases::{P, WORLD, cloth, every, stitch, weave};
-use toile::math::{Rotation, Vec3};
+use crate::yarn_cases::{P, WORLD, cloth, every, lay, stitch, weave};
+use toile::math::{Rotation, Vec2, Vec3};
 use toile::system::term::{Configuration, HessianKind};
+use toile::system::yarn::unknowns::Unknowns;
+use toile::yarn::Family;
 
 #[test]
 fn internal_terms_have_no_net_force_and_no_torque() {
@@ -175,4 +177,62 @@ fn totally_degenerate_states_stay_finite() {
 fn with(x: &[Vec3], first: usize, f: impl Fn(usize) -> Vec3) -> Vec<Vec3> {
     let place = |(b, p): (usize, &Vec3)| if b < first { f(b) } else { *p };
     x.iter().enumerate().map(place).collect()
+}
+
+/// A node's coordinates fill blocks of three in the order of its stack; what cannot slide is refused.
+#[test]
+fn coordinates_of_a_node_share_blocks_of_three() {
+    let uv = vec![Vec2::zeros(); 9];
+    let yarns: Vec<(Family, Vec<u32>)> = (0..4)
+        .map(|y| (Family::Course, vec![2 * y + 1, 0, 2 * y + 2]))
+        .collect();
+    let mesh = lay(uv, &yarns, |n| match n {
+        0 => vec![(2, 0), (0, 0), (3, 1), (1, 1)],
+        _ => vec![],
+    });
+    let mut wanted: Vec<bool> = mesh.incidences.iter().map(|i| i.slides).collect();
+    let all = Unknowns::new(&mesh, 5, 20, &wanted).expect("unknowns");
+    assert_eq!((all.slide_blocks(), all.sliding()), (2, 4));
+    assert_eq!((&all.owners[..], &all.used[..]), (&[0, 0][..], &[3, 1][..]));
+    let middle = [1, 4, 7, 10].map(|i| all.slides[i]);
+    assert_eq!(
+        middle,
+        [Some((20, 1)), Some((21, 0)), Some((20, 0)), Some((20, 2))]
+    );
+    wanted[0] = true;
+    let refused = Unknowns::new(&mesh, 5, 20, &wanted).expect_err("an end cannot slide");
+    assert!(
+        refused.to_string().contains("passage 0 at node 1"),
+        "{refused}"
+    );
+    assert!(Unknowns::new(&mesh, 5, 20, &wanted[1..]).is_err());
+}
+
+/// A step must leave a fifth of each segment's material in it; a segment without material has no finite energy.
+#[test]
+fn segments_keep_material() {
+    let mut cloth = cloth("", weave(5, 4), |_| true);
+    let (x, u) = (cloth.laid(), cloth.u());
+    let start = cloth.blocks(&x, &u);
+    let mut now = u.clone();
+    // the second passage of the first yarn moves half a pitch beyond its neighbour
+    now[1] += 1.5 * P;
+    let moved = cloth.blocks(&x, &now);
+    let at = Configuration {
+        x: &moved,
+        x0: &start,
+        u: &u,
+        inv_dt: 0.0,
+        world: &WORLD,
+    };
+    let mut part = 1.0_f64;
+    let mut highest = 0.0_f64;
+    for term in &mut cloth.terms {
+        part = part.min(term.max_step(&at));
+        for e in 0..term.stencils().count() {
+            highest = highest.max(term.value(e, &at));
+        }
+    }
+    assert!((part - 0.8 / 1.5).abs() < 1e-9, "{part}");
+    assert!(highest.is_infinite());
 }

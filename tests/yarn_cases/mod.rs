@@ -210,7 +210,13 @@ pub fn cloth(name: &str, mesh: YarnMesh, slides: impl Fn(usize) -> bool) -> Clot
 /// Both meshes with none, some and all of their coordinates sliding.
 pub fn cloths() -> Vec<Cloth> {
     let mut all = Vec::new();
-    for (name, mesh) in [("weave", weave(5, 4)), ("stitch", stitch())] {
+    let mut twice = stitch();
+    // a node that is in a stencil twice
+    twice.wraps.push(Wrap {
+        wings: [0, 0],
+        ..twice.wraps[0]
+    });
+    for (name, mesh) in [("weave", weave(5, 4)), ("stitch", twice)] {
         for (set, slides) in [("frozen", 0), ("sliding", 1), ("third", 3), ("half", 2)] {
             all.push(cloth(&format!("{name} {set}"), mesh.clone(), |i| {
                 slides > 0 && i % slides == 0
