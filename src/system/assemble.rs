@@ -109,7 +109,7 @@ impl Assembler {
                         out[*v as usize] += g;
                     }
                 }
-                let Some(kind) = hessian.filter(|_| !term.is_linear()) else {
+                let Some(kind) = hessian.filter(|kind| term.has_hessian(*kind)) else {
                     continue;
                 };
                 let buffer = &mut self.blocks[..batch * block_count];

@@ -160,9 +160,10 @@ pub trait Term: Send + Sync {
         let _ = at;
         false
     }
-    /// Whether the energy is linear, so that there is no Hessian.
-    fn is_linear(&self) -> bool {
-        false
+    /// Whether there is a Hessian of this kind; a linear energy has none.
+    fn has_hessian(&self, kind: HessianKind) -> bool {
+        let _ = kind;
+        true
     }
     /// Whether the energy is internal: no net force, invariant under rotation and translation.
     fn is_internal(&self) -> bool {

@@ -216,8 +216,8 @@ impl<K: Kernel<N>, const N: usize> Term for YarnTerm<K, N> {
         K::is_idle(at.inv_dt)
     }
 
-    fn is_linear(&self) -> bool {
-        K::LINEAR && self.arity == K::POSITIONS
+    fn has_hessian(&self, kind: HessianKind) -> bool {
+        !(K::LINEAR && (self.arity == K::POSITIONS || kind.exactness() == 0.0))
     }
 
     fn is_internal(&self) -> bool {

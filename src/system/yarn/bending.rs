@@ -40,6 +40,11 @@ pub struct Bending {
     pub damping: f64,
 }
 
+/// What damping acts on.
+fn softened(theta: f64) -> f64 {
+    (theta * theta + SOFT * SOFT).sqrt()
+}
+
 /// `G` and its first and second derivative.
 fn law(theta: f64) -> [f64; 3] {
     let jam = JAM.at(theta);
@@ -68,7 +73,7 @@ impl Bending {
         if rate > 0.0 {
             let [a, b] = edges(at.q0);
             let weight = 2.0 * rate * self.stiffness / (at.q0[10] - at.q0[9]);
-            (weight, angle(&a, &b).hypot(SOFT))
+            (weight, softened(angle(&a, &b)))
         } else {
             (0.0, 0.0)
         }
@@ -90,7 +95,7 @@ impl Bending {
         };
         let mut slope = [k * g[2].max(ratio), k * g[2]];
         if c > 0.0 {
-            let r = theta.hypot(SOFT);
+            let r = softened(theta);
             by_theta += c * (r - start) / r;
             let first = c * theta * theta / (r * r);
             let second = c * (r - start) * SOFT * SOFT / (r * r * r);
@@ -113,7 +118,7 @@ impl Kernel<11> for Bending {
         let [a, b] = edges(at.q);
         let theta = angle(&a, &b);
         let (c, start) = self.damped(at);
-        let since = theta.hypot(SOFT) - start;
+        let since = softened(theta) - start;
         let damped = if c > 0.0 {
             0.5 * c * since * since
         } else {

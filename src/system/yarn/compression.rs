@@ -439,8 +439,43 @@ fn turn(mesh: &YarnMesh, passages: &[Passage], node: usize) -> Option<Turn> {
 }
 
 /// Unit vector of the smallest eigenvalue of a symmetric matrix that is not negative.
+///
+/// That eigenvalue is the first root of the characteristic polynomial, which Newton's method reaches from 0
+/// without passing it; the vector is across the rows of what is left.
 fn smallest_direction(a: &Mat3) -> Vec3 {
+    let scale = a.trace();
+    let minors = [(0, 1), (1, 2), (0, 2)]
+        .map(|(i, j)| a[(i, i)] * a[(j, j)] - a[(i, j)] * a[(i, j)])
+        .iter()
+        .sum::<f64>();
+    let det = a.determinant();
+    let mut root = 0.0;
+    for _ in 0..20 {
+        let value = det - root * (minors - root * (scale - root));
+        let slope = minors - root * (2.0 * scale - 3.0 * root);
+        if !(value > 0.0 && slope > 0.0) {
+            break;
+        }
+        let step = value / slope;
+        root += step;
+        if step <= 1e-14 * scale {
+            break;
+        }
+    }
+    let left = a - Mat3::from_diagonal_element(root);
+    let rows = [0, 1, 2].map(|k| left.column(k).into_owned());
+    let mut best = Vec3::zeros();
+    for (i, j) in [(0, 1), (1, 2), (2, 0)] {
+        let across: Vec3 = rows[i].cross(&rows[j]);
+        if across.norm_squared() > best.norm_squared() {
+            best = across;
+        }
+    }
+    let size = best.norm();
+    if size > 1e-6 * scale * scale {
+        return best / size;
+    }
+    // two eigenvalues nearly agree
     let eigen = a.symmetric_eigen();
-    let least = eigen.eigenvalues.imin();
-    eigen.eigenvectors.column(least).into()
+    eigen.eigenvectors.column(eigen.eigenvalues.imin()).into()
 }

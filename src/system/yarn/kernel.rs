@@ -42,8 +42,7 @@ pub trait Kernel<const N: usize>: Send + Sync {
     const NAME: &'static str;
     /// Nodes; `N - 3 POSITIONS` material coordinates follow.
     const POSITIONS: usize;
-    /// Whether the energy is linear in the positions, so that there is no Hessian while no
-    /// coordinate slides.
+    /// Whether the energy is linear in the positions and has no semi-definite part by what slides.
     const LINEAR: bool = false;
     /// Whether the energy is invariant under translation and rotation.
     const INTERNAL: bool = true;
