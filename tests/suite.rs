@@ -97,6 +97,8 @@ mod tri_garments;
 mod tri_real;
 #[path = "yarn_contacts.rs"]
 mod yarn_contacts;
+#[path = "yarn_friction.rs"]
+mod yarn_friction;
 #[path = "yarn_laws.rs"]
 mod yarn_laws;
 #[path = "yarn_terms_fd.rs"]

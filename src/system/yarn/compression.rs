@@ -17,14 +17,15 @@
 use super::super::state::StrandState;
 use super::bending::Bending;
 use super::kernel::{Kernel, Local};
+use super::normals::{Plane, Turn};
 use super::spacing::Spacing;
 use super::stack::{MAX_STACK, StackRule, held_normal_forces, normal_forces};
 use super::stitch::StitchLength;
 use super::wrapping::Wrapping;
 use super::{YarnOptions, material_of, springs};
 use crate::error::{Error, Result};
+use crate::math::Vec3;
 use crate::math::parallel::Workers;
-use crate::math::{Mat3, Vec3};
 use crate::yarn::{Strand, YarnMaterial, YarnMesh};
 
 const CHUNK: usize = 256;
@@ -58,13 +59,6 @@ struct WrapLoad {
     nodes: [u32; 4],
     /// Incidences at `(q0, q1, wing)` of the yarn of each wing.
     incidences: [[Option<u32>; 3]; 2],
-}
-
-/// Which way a node's normal points: `sign` times the cross product of two yarns' directions.
-struct Turn {
-    sign: f64,
-    /// Nodes before and after along each of the two yarns.
-    ends: [[u32; 2]; 2],
 }
 
 /// Estimates compression; rest data and work memory.
@@ -143,7 +137,7 @@ impl Compression {
             }
         }
         let turns = (0..mesh.uv.len())
-            .map(|node| turn(mesh, &passages, node))
+            .map(|node| Turn::new(mesh, node))
             .collect();
         let wraps: Vec<WrapLoad> = springs::wraps(mesh, materials, options)?
             .into_iter()
@@ -231,27 +225,19 @@ impl Compression {
         if stack.len() < 2 {
             return Vec3::zeros();
         }
-        let origin = x[node];
-        let (mut sum, mut square, mut count) = (Vec3::zeros(), Mat3::zeros(), 1.0);
+        let mut plane = Plane::new(x[node]);
         for strand in stack {
             let i = strand.incidence as usize;
-            let passage = &self.passages[i];
-            let before = passage.before.then(|| self.passages[i - 1].node);
-            let after = passage.after.then(|| self.passages[i + 1].node);
-            for n in [before, after].into_iter().flatten() {
-                let d = x[n as usize] - origin;
-                sum += d;
-                square += d * d.transpose();
-                count += 1.0;
+            if self.passages[i].before {
+                plane.add(&x[self.passages[i - 1].node as usize]);
+            }
+            if self.passages[i].after {
+                plane.add(&x[self.passages[i + 1].node as usize]);
             }
         }
-        let covariance = square - sum * sum.transpose() / count;
-        let normal = smallest_direction(&covariance);
+        let normal = plane.normal();
         let reference = if *last == Vec3::zeros() {
-            self.turns[node].as_ref().map_or(normal, |t| {
-                let [a, b] = t.ends.map(|[p, n]| x[n as usize] - x[p as usize]);
-                a.cross(&b) * t.sign
-            })
+            self.turns[node].as_ref().map_or(normal, |t| t.front(x))
         } else {
             *last
         };
@@ -412,70 +398,4 @@ fn wrapped(passages: &[Passage], nodes: &[u32; 4], wing: u32, k: usize) -> [Opti
         out[far] = at(next, nodes[far]).map(|i| i as u32);
     }
     out
-}
-
-/// How the first two strands of different groups cross in the flat panel.
-fn turn(mesh: &YarnMesh, passages: &[Passage], node: usize) -> Option<Turn> {
-    let stack = mesh.stack(node);
-    let back = stack.first()?;
-    let front = stack.iter().find(|s| s.group != back.group)?;
-    let mut ends = [[node as u32; 2]; 2];
-    for (ends, strand) in ends.iter_mut().zip([back, front]) {
-        let i = strand.incidence as usize;
-        let same = |n: u32| mesh.node_panel[n as usize] == mesh.node_panel[node];
-        if passages[i].before && same(passages[i - 1].node) {
-            ends[0] = passages[i - 1].node;
-        }
-        if passages[i].after && same(passages[i + 1].node) {
-            ends[1] = passages[i + 1].node;
-        }
-    }
-    let [a, b] = ends.map(|[p, n]| mesh.uv[n as usize] - mesh.uv[p as usize]);
-    let cross = crate::math::geometry::cross2(&a, &b);
-    (cross != 0.0).then(|| Turn {
-        sign: cross.signum(),
-        ends,
-    })
-}
-
-/// Unit vector of the smallest eigenvalue of a symmetric matrix that is not negative.
-///
-/// That eigenvalue is the first root of the characteristic polynomial, which Newton's method reaches from 0
-/// without passing it; the vector is across the rows of what is left.
-fn smallest_direction(a: &Mat3) -> Vec3 {
-    let scale = a.trace();
-    let minors = [(0, 1), (1, 2), (0, 2)]
-        .map(|(i, j)| a[(i, i)] * a[(j, j)] - a[(i, j)] * a[(i, j)])
-        .iter()
-        .sum::<f64>();
-    let det = a.determinant();
-    let mut root = 0.0;
-    for _ in 0..20 {
-        let value = det - root * (minors - root * (scale - root));
-        let slope = minors - root * (2.0 * scale - 3.0 * root);
-        if !(value > 0.0 && slope > 0.0) {
-            break;
-        }
-        let step = value / slope;
-        root += step;
-        if step <= 1e-14 * scale {
-            break;
-        }
-    }
-    let left = a - Mat3::from_diagonal_element(root);
-    let rows = [0, 1, 2].map(|k| left.column(k).into_owned());
-    let mut best = Vec3::zeros();
-    for (i, j) in [(0, 1), (1, 2), (2, 0)] {
-        let across: Vec3 = rows[i].cross(&rows[j]);
-        if across.norm_squared() > best.norm_squared() {
-            best = across;
-        }
-    }
-    let size = best.norm();
-    if size > 1e-6 * scale * scale {
-        return best / size;
-    }
-    // two eigenvalues nearly agree
-    let eigen = a.symmetric_eigen();
-    eigen.eigenvectors.column(eigen.eigenvalues.imin()).into()
 }

@@ -14,6 +14,7 @@ pub mod friction;
 pub mod gravity;
 pub mod inertia;
 pub mod kernel;
+pub(super) mod normals;
 pub mod shear;
 pub mod slip;
 pub mod spacing;
