@@ -7,9 +7,10 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use toile::math::parallel::Workers;
 use toile::math::{Vec2, Vec3};
 use toile::system::snapshot::{read, write};
-use toile::system::state::{State, StrandState};
+use toile::system::state::State;
 use toile::system::term::{Configuration, HessianKind};
 use toile::system::yarn::compression::{Compression, YarnPlace};
+use toile::system::yarn::friction::loose;
 use toile::system::yarn::slip::{SlipRule, set_anchors, sliding};
 use toile::system::yarn::springs::frictions;
 use toile::system::yarn::stack::StackRule;
@@ -40,16 +41,9 @@ fn anchors_stick_slip_and_follow() {
         (lambda, -3.0 * reach, -2.0 * reach, -force),
         (0.0, 3.0 * reach, 3.0 * reach, 0.0),
     ] {
-        for (s, strand) in state.strands.iter_mut().enumerate() {
-            let i = cloth.mesh.stacks[s].incidence as usize;
-            *strand = StrandState {
-                anchor: u[i],
-                beside: 0.0,
-                contact,
-            };
-            if let Some(next) = cloth.mesh.stacks.get(s + 1) {
-                strand.beside = u[i] - u[next.incidence as usize];
-            }
+        state.strands = loose(&cloth.mesh, &u);
+        for strand in &mut state.strands {
+            strand.contact = contact;
         }
         // only the strand in question is moved, and for the pair only its first one
         for (s, name) in [(own, "sliding_friction"), (pair, "parallel_friction")] {
@@ -209,10 +203,7 @@ fn capstan(n: usize, friction: f64, around: f64) -> f64 {
     let strain = tension / material.stretch;
     u[..ends].iter_mut().for_each(|u| *u /= 1.0 + strain);
     let mut state: State = crate::yarn_cases::empty(Vec::new());
-    state.strands = vec![StrandState::default(); mesh.stacks.len()];
-    for (s, strand) in mesh.stacks.iter().enumerate() {
-        state.strands[s].anchor = u[strand.incidence as usize];
-    }
+    state.strands = loose(&mesh, &u);
     let mut normals = vec![Vec3::zeros(); x.len()];
     let held = vec![true; x.len()];
     let pull = |u: &[f64], k: usize| material.stretch * (P / (u[k + 1] - u[k]) - 1.0);

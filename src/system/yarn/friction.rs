@@ -15,8 +15,9 @@
 //! in slip and is never part of stiffness-proportional damping. Viscous resistance is `d_f/(2 dt) (m - m0)^2` in `u`
 //! alone. SI units.
 
-use super::super::state::State;
+use super::super::state::{State, StrandState};
 use super::kernel::{Kernel, Local, Lower};
+use crate::yarn::YarnMesh;
 
 /// Friction of a strand, by its own coordinate (`Kernel<1>`) or against the next strand in its
 /// stack (`Kernel<2>`).
@@ -31,6 +32,19 @@ pub struct Rubbing {
     pub viscosity: f64,
     anchor: f64,
     bound: f64,
+}
+
+/// Strands at the coordinates `u` without friction: every anchor where its measure is, no normal force.
+pub fn loose(mesh: &YarnMesh, u: &[f64]) -> Vec<StrandState> {
+    let at = |s: usize| u[mesh.stacks[s].incidence as usize];
+    (0..mesh.stacks.len())
+        .map(|s| StrandState {
+            anchor: at(s),
+            // of no use in the last strand of a stack
+            beside: at(s) - at((s + 1).min(mesh.stacks.len() - 1)),
+            contact: 0.0,
+        })
+        .collect()
 }
 
 /// Largest friction of a strand [N]: `friction` with the strand behind and in front.
