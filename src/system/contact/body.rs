@@ -12,6 +12,7 @@
 
 use super::super::state::{BodyAnchor, State};
 use super::super::term::{Configuration, HessianKind, Stencils, Term};
+use super::clearance::Clearance;
 use super::friction::{Friction, kept};
 use crate::cloth::Cloth;
 use crate::math::{Mat3, Vec3};
@@ -35,9 +36,7 @@ impl Rub {
 pub struct BodyContact {
     vertices: Vec<u32>,
     areas: Vec<f64>,
-    /// Per vertex and body: how far the vertex may move before it can touch.
-    clearance: Vec<f64>,
-    body_count: usize,
+    clearance: Clearance,
     /// CSR by vertex.
     rub_starts: Vec<u32>,
     rubs: Vec<Rub>,
@@ -50,8 +49,7 @@ impl BodyContact {
         Self {
             vertices: (0..n as u32).collect(),
             areas: cloth.vertex_areas.clone(),
-            clearance: Vec::new(),
-            body_count: 0,
+            clearance: Clearance::default(),
             rub_starts: vec![0; n + 1],
             rubs: Vec::new(),
         }
@@ -62,8 +60,7 @@ impl BodyContact {
         e: usize,
         at: &'a Configuration<'_>,
     ) -> impl Iterator<Item = usize> + 'a {
-        let moved = (at.x[e] - at.x0[e]).norm();
-        (0..self.body_count).filter(move |b| moved >= self.clearance[e * self.body_count + b])
+        self.clearance.touching(e, (at.x[e] - at.x0[e]).norm())
     }
 
     fn rubs(&self, e: usize) -> &[Rub] {
@@ -147,14 +144,7 @@ impl Term for BodyContact {
 
     fn begin_step(&mut self, state: &State, at: &Configuration<'_>) -> bool {
         let bodies = at.world.bodies;
-        self.body_count = bodies.count();
-        self.clearance.clear();
-        for x in at.x0 {
-            for b in 0..self.body_count {
-                self.clearance
-                    .push(bodies.value(b, x) - bodies.contact(b).thickness);
-            }
-        }
+        self.clearance.update(bodies, at.x0.iter().copied(), 1.0);
         self.rubs.clear();
         self.rub_starts.fill(0);
         for anchor in &state.body_anchors {
