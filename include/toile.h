@@ -187,6 +187,18 @@
 #define TOILE_OUTCOME_CANCELLED 3
 
 /**
+ * A drape ended where no step, however short, leads lower; the state is admissible, the residual is
+ * in the report, the reason in the log.
+ */
+#define TOILE_OUTCOME_STALLED 4
+
+/**
+ * Nothing holds a part of the garment and nothing lies on its way: a drape of it would never end.
+ * The state is that at which this was seen; the log names the part.
+ */
+#define TOILE_OUTCOME_FALLING 5
+
+/**
  * A body that cloth meets: a signed distance field, negative inside. Never changes.
  */
 typedef struct toile_body toile_body;
@@ -379,6 +391,36 @@ typedef struct toile_sdf_grid_desc {
 typedef void (*toile_log_fn)(void *user, uint32_t level, const char *message);
 
 /**
+ * How far a long call has come.
+ */
+typedef struct toile_progress {
+    /**
+     * sizeof(toile_progress) of the library; a newer library may have appended fields.
+     */
+    size_t struct_size;
+    /**
+     * Estimate of the part done, 0 to 1, never decreasing.
+     */
+    double fraction;
+    /**
+     * Name of the stage, UTF-8, valid during the callback: "sew", "settle", "unfold", "rest" of a
+     * drape, "step" of a step.
+     */
+    const char *stage;
+    /**
+     * Largest force on a free vertex now [N].
+     */
+    double residual;
+} toile_progress;
+
+/**
+ * Called on the calling thread while a long call works. Returns 0 to go on; anything else stops
+ * the call as soon as there is an admissible state. The simulation at work is busy for calls from
+ * in here. Must not throw or jump out.
+ */
+typedef int32_t (*toile_progress_fn)(void *user, const struct toile_progress *progress);
+
+/**
  * The world of a simulation.
  */
 typedef struct toile_sim_desc {
@@ -418,6 +460,15 @@ typedef struct toile_sim_desc {
      * Handed to the log callback.
      */
     void *log_user;
+    /**
+     * Told before every substep how far a step has come (its stage is "step"), and asked whether to
+     * go on; NULL for none. A step that is stopped leaves the simulation as it was before it.
+     */
+    toile_progress_fn progress;
+    /**
+     * Handed to the progress callback.
+     */
+    void *progress_user;
 } toile_sim_desc;
 
 /**
@@ -441,35 +492,6 @@ typedef struct toile_contact_desc {
      */
     double stiffness;
 } toile_contact_desc;
-
-/**
- * How far a long call has come.
- */
-typedef struct toile_progress {
-    /**
-     * sizeof(toile_progress) of the library; a newer library may have appended fields.
-     */
-    size_t struct_size;
-    /**
-     * Estimate of the part done, 0 to 1, never decreasing.
-     */
-    double fraction;
-    /**
-     * Name of the stage, UTF-8, valid during the callback: "sew", "settle", "unfold", "rest".
-     */
-    const char *stage;
-    /**
-     * Largest force on a free vertex now [N].
-     */
-    double residual;
-} toile_progress;
-
-/**
- * Called on the calling thread while a long call works. Returns 0 to go on; anything else stops
- * the call as soon as there is an admissible state. The simulation at work is busy for calls from
- * in here. Must not throw or jump out.
- */
-typedef int32_t (*toile_progress_fn)(void *user, const struct toile_progress *progress);
 
 /**
  * How to drape.
@@ -1083,15 +1105,17 @@ void toile_sim_free(struct toile_sim *sim);
 
 /**
  * Advances by exactly `dt` [s], in smaller steps inside where needed, or fails and leaves the
- * simulation as it was. `report` may be NULL. TOILE_E_NO_ADMISSIBLE_STATE: pins or bodies ask for
- * what cannot be; a shorter step may pass.
+ * simulation as it was. `report` may be NULL. Stopped by the simulation's progress callback it is
+ * TOILE_OK, has advanced by 0 and leaves everything as it was. TOILE_E_NO_ADMISSIBLE_STATE: pins or
+ * bodies ask for what cannot be; a shorter step may pass.
  */
 toile_status toile_sim_step(struct toile_sim *sim, double dt, struct toile_step_report *report);
 
 /**
  * Sews the garment and lets it come to rest. `desc` NULL takes the defaults; `report` may be NULL.
- * Stopped by the iteration limit or by the progress callback it is TOILE_OK too, with the outcome
- * in the report, and may be called again to go on.
+ * Stopped by the iteration limit, by the progress callback, in a dead end, or because nothing holds
+ * the garment, it is TOILE_OK too, with the outcome in the report, and may be called again to go
+ * on.
  */
 toile_status toile_sim_drape(struct toile_sim *sim,
                              const struct toile_drape_desc *desc,

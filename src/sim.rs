@@ -16,7 +16,7 @@ use crate::solve::engine::Engine;
 pub use crate::solve::report::{Energies, Outcome, StepReport};
 pub use crate::solve::settings::Settings;
 use crate::system::build::{BuildOptions, System};
-use crate::system::snapshot;
+use crate::system::snapshot::{self, Origin};
 use crate::system::state::State;
 pub use crate::system::term::ContactSettings;
 use crate::tri::GarmentMesh;
@@ -50,7 +50,7 @@ pub struct DrapeOptions {
 pub struct Progress {
     /// Estimate of the part done, 0 to 1, never decreasing.
     pub fraction: f64,
-    /// Stage name: "sew", "settle", "unfold", "rest".
+    /// Stage name: "sew", "settle", "unfold", "rest" of a drape, "step" of a step.
     pub stage: &'static str,
     /// Present residual [N].
     pub residual: f64,
@@ -66,13 +66,13 @@ pub struct Sim {
     mesh: GarmentMesh,
     masses: Vec<f64>,
     epoch: u64,
-    fingerprint: u64,
+    origin: Origin,
 }
 
 impl Sim {
     /// Triangulates and compiles the garment; its vertices stand where the panels are placed.
     pub fn new(garment: &Garment, options: &SimOptions) -> Result<Self> {
-        garment.check()?;
+        garment.check_within(options.settings.max_vertices as usize)?;
         if !garment.blend_regions.is_empty() {
             return Err(Error::unsupported(
                 "the garment has a blend region, and this version simulates triangles only",
@@ -85,13 +85,17 @@ impl Sim {
     /// A simulation on a mesh of the caller's making, for benchmarks and tests of the mechanics.
     pub fn from_mesh(garment: &Garment, mesh: GarmentMesh, options: &SimOptions) -> Result<Self> {
         let gravity = options.gravity.unwrap_or([0.0, -9.81, 0.0]);
-        garment.check()?;
+        garment.check_geometry()?;
         finite("gravity", &gravity)?;
         finite("wind", &options.wind)?;
         finite("pressure", &[options.pressure])?;
         let cloth = Cloth::new(garment, mesh.clone())?;
         let masses = cloth.masses.clone();
-        let fingerprint = snapshot::fingerprint(&cloth);
+        let origin = Origin {
+            garment: snapshot::fingerprint(&cloth),
+            bodies: Vec::new(),
+            numbers: options.settings.that_matter(),
+        };
         let system = System::new(cloth, &BuildOptions::from(&options.settings))?;
         let state = State {
             time: 0.0,
@@ -115,7 +119,7 @@ impl Sim {
             mesh,
             masses,
             epoch: 1,
-            fingerprint,
+            origin,
         })
     }
 
@@ -130,7 +134,7 @@ impl Sim {
 
     /// The state as bytes.
     pub fn save(&self) -> Result<Vec<u8>> {
-        snapshot::write(&self.state, self.fingerprint)
+        snapshot::write(&self.state, &self.origin)
     }
 
     /// A copy of the state, to go back to with [`Sim::roll_back`]: cheaper than bytes.
@@ -144,9 +148,10 @@ impl Sim {
         self.epoch += 1;
     }
 
-    /// Restores saved bytes of the same garment and bodies; on error nothing changes.
+    /// Restores saved bytes of the same garment, bodies and tunables (threads and the limit of
+    /// vertices may differ, as no bit depends on them); on error nothing changes.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<()> {
-        let mut state = snapshot::read(bytes, self.fingerprint, &self.state)?;
+        let mut state = snapshot::read(bytes, &self.origin, &self.state)?;
         for (b, ((body, _), entry)) in self.bodies.iter().zip(&mut state.bodies).enumerate() {
             for vertices in [&entry.vertices, &entry.target_vertices] {
                 if !vertices.is_empty() && vertices.len() != body.vertices().len() {

@@ -337,3 +337,48 @@ fn world_numbers_go_in_and_come_out() {
     );
     assert_eq!(sim.number("solver.newton.max_iterations"), 40.0);
 }
+
+#[test]
+fn a_step_tells_how_far_it_is_and_may_be_stopped_as_if_it_had_not_begun() {
+    struct Told {
+        fractions: Vec<f64>,
+        stop_after: usize,
+    }
+    extern "C" fn watch(user: *mut c_void, progress: *const toile_progress) -> i32 {
+        let (told, progress) = unsafe { (&mut *user.cast::<Told>(), &*progress) };
+        let stage = unsafe { CStr::from_ptr(progress.stage) };
+        assert_eq!(stage, c"step");
+        told.fractions.push(progress.fraction);
+        i32::from(told.fractions.len() >= told.stop_after)
+    }
+    let mut told = Told {
+        fractions: Vec::new(),
+        stop_after: 3,
+    };
+    let mut desc = filled(toile_sim_desc_init);
+    desc.progress = Some(watch);
+    desc.progress_user = (&raw mut told).cast();
+    let garment = square(0.05, 0.0);
+    let mut out = ptr::null_mut();
+    ok(unsafe { toile_sim_create(garment.0, &desc, &mut out) });
+    let sim = Sim(out);
+    // several substeps
+    ok(unsafe { toile_sim_set_number(sim.0, c"solver.step.max".as_ptr(), 0.01) });
+    let before = sim.save();
+    let mut report = filled(toile_step_report_init);
+    ok(unsafe { toile_sim_step(sim.0, 0.05, &mut report) });
+    assert_eq!(report.outcome, TOILE_OUTCOME_CANCELLED);
+    assert_eq!(report.advanced, 0.0);
+    assert!(
+        sim.save() == before,
+        "the stopped step left something behind"
+    );
+    for (k, fraction) in told.fractions.iter().enumerate() {
+        assert!((fraction - 0.2 * k as f64).abs() < 1e-9, "{k}: {fraction}");
+    }
+    told.fractions.clear();
+    told.stop_after = usize::MAX;
+    ok(unsafe { toile_sim_step(sim.0, 0.05, &mut report) });
+    assert_eq!(report.outcome, TOILE_OUTCOME_CONVERGED);
+    assert_eq!(told.fractions.len(), 5);
+}

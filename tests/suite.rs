@@ -40,6 +40,8 @@ mod capi_threads;
 mod cli_toile;
 #[path = "docs.rs"]
 mod docs;
+#[path = "drape_ends.rs"]
+mod drape_ends;
 #[path = "fmi.rs"]
 mod fmi;
 #[path = "hard_cases.rs"]
@@ -84,6 +86,8 @@ mod scene_reader;
 mod self_contact_sheets;
 #[path = "self_contact_term.rs"]
 mod self_contact_term;
+#[path = "snapshots.rs"]
+mod snapshots;
 #[path = "terms_fd.rs"]
 mod terms_fd;
 #[path = "terms_physics.rs"]

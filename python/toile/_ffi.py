@@ -66,6 +66,8 @@ STRUCTS: dict[str, list[tuple[str, Any]]] = {
         ("max_vertices", c_uint64),
         ("log", log_fn),
         ("log_user", c_void_p),
+        ("progress", progress_fn),
+        ("progress_user", c_void_p),
     ],
     "toile_contact_desc": [
         ("friction", c_double),

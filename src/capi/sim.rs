@@ -7,6 +7,7 @@ use super::guard::{entry, guard};
 use super::handle::Table;
 use super::input::{self, LARGEST_COUNT};
 use super::log::{Log, TOILE_LOG_ERROR, TOILE_LOG_INFO, TOILE_LOG_WARNING};
+use super::motion::Watcher;
 use super::output;
 use super::status::toile_status;
 use super::types::{toile_body, toile_contact_desc, toile_garment, toile_sim, toile_sim_desc};
@@ -20,9 +21,17 @@ use std::ptr;
 /// A simulation and what the boundary keeps beside it.
 pub(super) struct SimObject {
     pub(super) sim: Sim,
-    log: Log,
+    host: Host,
     /// Calls that failed, left the state as it was, but elsewhere in memory.
     moved: u64,
+}
+
+/// The host's callbacks.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Host {
+    pub(super) log: Log,
+    /// Of steps; a drape brings its own.
+    pub(super) watcher: Watcher,
 }
 
 impl SimObject {
@@ -41,17 +50,17 @@ pub(super) fn read<R>(sim: *const toile_sim, f: impl FnOnce(&Sim) -> Result<R>) 
 /// Runs a call that may change the simulation; its failure is logged.
 pub(super) fn write<R>(
     sim: *mut toile_sim,
-    f: impl FnOnce(&mut Sim, &Log) -> Result<R>,
+    f: impl FnOnce(&mut Sim, &Host) -> Result<R>,
 ) -> Result<R> {
     SIMS.get(sim.addr())?.write(|object| {
-        let log = object.log;
+        let host = object.host;
         let place = |sim: &Sim| (sim.positions().as_ptr(), sim.velocities().as_ptr());
         let before = place(&object.sim);
-        f(&mut object.sim, &log).inspect_err(|error| {
+        f(&mut object.sim, &host).inspect_err(|error| {
             if place(&object.sim) != before {
                 object.moved += 1;
             }
-            log.say(TOILE_LOG_ERROR, || error.message.clone());
+            host.log.say(TOILE_LOG_ERROR, || error.message.clone());
         })
     })
 }
@@ -79,8 +88,8 @@ fn no_yarns(garment: &Garment, panel: u32) -> Error {
     ))
 }
 
-unsafe fn give(sim: Sim, log: Log, out: *mut *mut toile_sim) -> Result<()> {
-    log.say(TOILE_LOG_INFO, || {
+unsafe fn give(sim: Sim, host: Host, out: *mut *mut toile_sim) -> Result<()> {
+    host.log.say(TOILE_LOG_INFO, || {
         let info = sim.info();
         format!(
             "{} vertices, {} triangles, {} unknowns, smallest angle {:.1} degrees, {}",
@@ -92,9 +101,13 @@ unsafe fn give(sim: Sim, log: Log, out: *mut *mut toile_sim) -> Result<()> {
         )
     });
     for note in sim.info().notes {
-        log.say(TOILE_LOG_WARNING, || note.clone());
+        host.log.say(TOILE_LOG_WARNING, || note.clone());
     }
-    let handle = ptr::without_provenance_mut(SIMS.insert(SimObject { sim, log, moved: 0 })?);
+    let handle = ptr::without_provenance_mut(SIMS.insert(SimObject {
+        sim,
+        host,
+        moved: 0,
+    })?);
     // SAFETY: checked by the caller.
     unsafe { output::put(out, handle) };
     Ok(())
@@ -126,12 +139,15 @@ pub unsafe extern "C" fn toile_sim_create(
             pressure: input::finite(desc.pressure, "pressure")?,
             settings,
         };
-        let log = Log::new(desc.log, desc.log_user);
+        let host = Host {
+            log: Log::new(desc.log, desc.log_user),
+            watcher: Watcher::new(desc.progress, desc.progress_user),
+        };
         let sim = garment.read(|object| {
             refuse_regions(&object.garment)?;
             Sim::new(&object.garment, &options)
         })?;
-        give(sim, log, out)
+        give(sim, host, out)
     })
 }
 
@@ -152,7 +168,14 @@ pub unsafe extern "C" fn toile_sim_from_scene(
         let folder = input::optional_folder(base_dir)?;
         let (sim, _) = sim_scene::sim_from_json(text, folder.as_deref())?;
         refuse_regions(sim.garment())?;
-        give(sim, Log::none(), out)
+        give(
+            sim,
+            Host {
+                log: Log::none(),
+                watcher: Watcher::none(),
+            },
+            out,
+        )
     })
 }
 

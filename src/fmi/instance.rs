@@ -276,10 +276,11 @@ impl Instance {
             }
             self.log.say(status, || {
                 format!(
-                    "drape: {}, {} steps, residual {:.3e} N",
+                    "drape: {}, {} steps, residual {:.3e} N {}",
                     report.outcome.name(),
                     report.substeps,
-                    report.residual
+                    report.residual,
+                    report.reason
                 )
             });
             self.results = Results::of(Some(report));
@@ -319,7 +320,6 @@ impl Instance {
         match self.advance(size) {
             Ok(report) => {
                 self.time = end;
-                self.results = Results::of(Some(report));
                 if report.outcome != Outcome::Converged {
                     self.log.say(Status::Ok, || {
                         format!(
@@ -330,6 +330,7 @@ impl Instance {
                         )
                     });
                 }
+                self.results = Results::of(Some(report));
                 Ok(Status::Ok)
             }
             Err(e) => {

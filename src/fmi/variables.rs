@@ -3,6 +3,7 @@
 //! place in that list.
 
 use super::fabric_numbers::FabricNumber;
+use crate::solve::settings::Settings;
 
 /// Data type, as FMI 3 names them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -284,6 +285,9 @@ impl Variable {
                 bound(self.max, "inf")
             )));
         }
-        Ok(())
+        match self.quantity {
+            Quantity::Setting(s) => Settings::KEYS[s].check(value),
+            _ => Ok(()),
+        }
     }
 }

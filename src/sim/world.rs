@@ -5,6 +5,7 @@ use crate::body::{Body, Pose};
 use crate::error::{Error, Result};
 use crate::math::{Rotation, Vec3};
 use crate::system::bodies::check_index;
+use crate::system::snapshot::BodyOrigin;
 use crate::system::state::{Pin, State};
 use std::sync::PoisonError;
 
@@ -14,6 +15,10 @@ impl Sim {
         contact.check()?;
         let entry = self.engine().system.bodies.add(body, contact);
         self.state.bodies.push(entry);
+        self.origin.bodies.push(BodyOrigin {
+            shape: body.fingerprint(),
+            contact: *contact,
+        });
         self.bodies.push((body.clone(), *contact));
         self.epoch += 1;
         Ok((self.bodies.len() - 1) as u32)
@@ -93,13 +98,12 @@ impl Sim {
         let state = &mut self.state.bodies[b];
         if !state.moved_with_time {
             // a placement: the deformed field must exist before anything is changed
-            self.bodies[b].0.deformed_with(
-                &vertices,
-                self.engine
-                    .lock()
-                    .unwrap_or_else(PoisonError::into_inner)
-                    .workers(),
-            )?;
+            let mut engine = self.engine.lock().unwrap_or_else(PoisonError::into_inner);
+            let deformed = self.bodies[b]
+                .0
+                .deformed_with(&vertices, engine.workers())?;
+            engine.system.bodies.place(b, deformed, &vertices);
+            drop(engine);
             state.vertices.clone_from(&vertices);
             state.target_vertices.clear();
         } else {
@@ -240,6 +244,7 @@ impl Sim {
             let mut settings = self.settings.clone();
             settings.set(name, value)?;
             self.engine().set_settings(&settings)?;
+            self.origin.numbers = settings.that_matter();
             self.settings = settings;
         }
         self.epoch += 1;

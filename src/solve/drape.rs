@@ -1,7 +1,7 @@
 //! Static drape: sewing, coarse levels, the unfolding of a tangle, and rest.
 
 use super::engine::Engine;
-use super::relax::{RelaxOptions, Relaxed, relax};
+use super::relax::{End, RelaxOptions, Relaxed, relax};
 use super::step::{Totals, step};
 use crate::error::{Result, Status};
 use crate::math::Vec3;
@@ -73,8 +73,7 @@ pub fn drape(
     engine.begin();
     let mut all = Relaxed {
         totals: Totals::default(),
-        converged: false,
-        cancelled: false,
+        end: End::Limit,
     };
     let mut carried: Option<(Engine, State)> = None;
     for level in levels {
@@ -100,12 +99,17 @@ pub fn drape(
             )?;
         }
         carried = Some((coarse, coarse_state));
-        if all.cancelled {
+        if all.is_over() {
             break;
         }
     }
     // a drape that was stopped while it sewed goes on with that
     let open = engine.system.largest_seam_gap(&state.positions) > NEARLY_CLOSED;
+    if !flat && !open && engine.residual(state)? <= plan.force_tolerance {
+        // at rest already: left there, not disturbed to be brought back
+        all.end = End::Rest;
+        return stopped(engine, state, all);
+    }
     match &carried {
         Some((from, positions)) => transfer(from, positions, engine, state)?,
         None if flat || open => {
@@ -113,46 +117,42 @@ pub fn drape(
         }
         None => {}
     }
-    if all.cancelled {
+    if all.is_over() {
         return stopped(engine, state, all);
     }
     if !flat && tangled(&engine.system, state) {
         let done = unfold(engine, state, plan, &mut all, watch);
         let restored = engine.soften(1.0);
-        let done = done?;
+        done?;
         restored?;
-        if done.cancelled {
+        if all.is_over() {
             return stopped(engine, state, all);
         }
     }
-    let options = settle_options(plan, plan.force_tolerance);
+    let mut options = settle_options(plan, plan.force_tolerance);
     for round in 0..ROUNDS {
-        let done = stage(engine, state, &options, REST, "rest", &mut all, watch)?;
-        all.converged = done.converged;
-        if !done.converged || done.cancelled || round + 1 == ROUNDS {
+        stage(engine, state, &options, REST, "rest", &mut all, watch)?;
+        if all.end != End::Rest || round + 1 == ROUNDS {
             break;
         }
         // Newton's method may stop at an equilibrium that the least motion leaves
-        let rested = state.positions.clone();
+        let rested = state.clone();
         let probed = probe(engine, state, &mut all)?;
         let moved = state
             .positions
             .iter()
-            .zip(&rested)
+            .zip(&rested.positions)
             .map(|(p, q)| (p - q).norm());
         if !probed || moved.fold(0.0, f64::max) < STILL {
+            *state = rested;
             break;
         }
+        options.disturbed = false;
     }
-    if all.converged {
-        state.velocities.fill(Vec3::zeros());
-        Ok(all)
-    } else {
-        stopped(engine, state, all)
-    }
+    stopped(engine, state, all)
 }
 
-/// The end of a drape before rest, with the residual of the state that it leaves.
+/// The end of a drape, with the residual of the state that it leaves.
 fn stopped(engine: &mut Engine, state: &mut State, mut all: Relaxed) -> Result<Relaxed> {
     state.velocities.fill(Vec3::zeros());
     all.totals.residual = engine.residual(state)?;
@@ -176,7 +176,7 @@ fn unfold(
     plan: &Plan,
     all: &mut Relaxed,
     watch: &mut Watch<'_>,
-) -> Result<Relaxed> {
+) -> Result<()> {
     let cloth = &engine.system.cloth;
     let weight = state.gravity.norm() * cloth.masses.iter().sum::<f64>() / cloth.area().sqrt();
     let mut factor = (SOFTEST * weight / cloth.mean_stiffness()).clamp(LEAST_FACTOR, 1.0);
@@ -186,15 +186,17 @@ fn unfold(
         max_steps: plan.max_steps.min(UNFOLD_STEPS),
         first_step: 0.1,
         largest_step: 10.0,
+        disturbed: true,
     };
     loop {
         engine.soften(factor)?;
-        let done = stage(engine, state, &options, UNFOLD, "unfold", all, watch)?;
+        stage(engine, state, &options, UNFOLD, "unfold", all, watch)?;
         factor *= STIFFEN;
-        if done.cancelled || factor >= 1.0 {
-            return Ok(done);
+        if all.is_over() || factor >= 1.0 {
+            return Ok(());
         }
         options.max_steps = plan.max_steps.min(STIFFEN_STEPS);
+        options.disturbed = false;
     }
 }
 
@@ -205,8 +207,9 @@ fn probe(engine: &mut Engine, state: &mut State, all: &mut Relaxed) -> Result<bo
     let mut quiet = 0;
     for _ in 0..PROBE_STEPS {
         let start = state.positions.clone();
-        match step(engine, state, PROBE_STEP) {
+        match step(engine, state, PROBE_STEP, &mut |_, _| true) {
             Ok(totals) => {
+                let totals = totals.unwrap_or_default();
                 all.totals.newton_iterations += totals.newton_iterations;
                 all.totals.linear_iterations += totals.linear_iterations;
                 all.totals.substeps += totals.substeps;
@@ -247,10 +250,11 @@ fn settle_options(plan: &Plan, force_tolerance: f64) -> RelaxOptions {
         max_steps: plan.max_steps,
         first_step: 0.01,
         largest_step: 10.0,
+        disturbed: true,
     }
 }
 
-/// Pulls the seams together without weight and friction. False if the host stopped it.
+/// Pulls the seams together without weight and friction. False if the drape is to end there.
 fn sew(
     engine: &mut Engine,
     state: &mut State,
@@ -267,6 +271,7 @@ fn sew(
         max_steps: plan.max_steps,
         first_step: 0.01,
         largest_step: 0.05,
+        disturbed: false,
     };
     let gravity = std::mem::replace(&mut state.gravity, Vec3::zeros());
     let smooth = engine.system.bodies.with_friction(0.0);
@@ -277,9 +282,9 @@ fn sew(
     state.gravity = gravity;
     state.body_anchors.clear();
     let restored = engine.set_settings(&settings);
-    let done = done?;
+    done?;
     restored?;
-    Ok(!done.cancelled)
+    Ok(!all.is_over())
 }
 
 /// Sews with the pull of the settings; a seam that stays open under it, because the garment is
@@ -290,18 +295,18 @@ fn close(
     options: &RelaxOptions,
     all: &mut Relaxed,
     watch: &mut Watch<'_>,
-) -> Result<Relaxed> {
+) -> Result<()> {
     let mut settings = engine.settings.clone();
-    let mut done = stage(engine, state, options, SEW, "sew", all, watch)?;
+    stage(engine, state, options, SEW, "sew", all, watch)?;
     for _ in 0..DOUBLINGS {
-        if done.cancelled || engine.system.largest_seam_gap(&state.positions) < NEARLY_CLOSED {
+        if all.is_over() || engine.system.largest_seam_gap(&state.positions) < NEARLY_CLOSED {
             break;
         }
         settings.seam_pull *= 2.0;
         engine.set_settings(&settings)?;
-        done = stage(engine, state, options, SEW, "sew", all, watch)?;
+        stage(engine, state, options, SEW, "sew", all, watch)?;
     }
-    Ok(done)
+    Ok(())
 }
 
 fn stage(
@@ -312,7 +317,7 @@ fn stage(
     name: &'static str,
     all: &mut Relaxed,
     watch: &mut Watch<'_>,
-) -> Result<Relaxed> {
+) -> Result<()> {
     let mut first = 0.0_f64;
     let mut best = 0.0_f64;
     let done = relax(engine, state, options, &mut |step, residual| {
@@ -327,8 +332,15 @@ fn stage(
     all.totals.newton_iterations += done.totals.newton_iterations;
     all.totals.linear_iterations += done.totals.linear_iterations;
     all.totals.residual = done.totals.residual;
-    all.cancelled |= done.cancelled;
-    Ok(done)
+    all.end = done.end;
+    Ok(())
+}
+
+impl Relaxed {
+    /// Whether what ended a stage ends the whole drape.
+    fn is_over(&self) -> bool {
+        matches!(self.end, End::Cancelled | End::Falling(_))
+    }
 }
 
 /// The state of a coarse level: as placed, in the same world, held at the vertices nearest to the

@@ -1,6 +1,7 @@
 //! Solvers: Newton with a line search, step control, static drape, linear systems behind one trait.
 
 pub mod drape;
+mod drift;
 pub mod engine;
 pub mod linear;
 pub mod newton;

@@ -69,6 +69,16 @@ impl BodySet {
         self.entries.get(body).map(|e| &e.end)
     }
 
+    /// Puts a deformed body at `vertices` in, for a state that has them: made once, not again by
+    /// [`BodySet::prepare`].
+    pub fn place(&mut self, body: usize, deformed: Body, vertices: &[Vec3]) {
+        let entry = &mut self.entries[body];
+        entry.end = deformed.clone();
+        entry.start = deformed;
+        entry.start_vertices = vertices.to_vec();
+        entry.end_vertices = vertices.to_vec();
+    }
+
     /// The same bodies with the friction of each multiplied by `factor`.
     #[must_use]
     pub fn with_friction(&self, factor: f64) -> Self {

@@ -96,6 +96,29 @@ impl System {
         (2.0 * self.bodies.contact(body).thickness).max(4e-3)
     }
 
+    /// Vertices of each part that hangs together by triangles and seams, parts by their first vertex.
+    pub fn parts(&self) -> Vec<Vec<u32>> {
+        let mesh = &self.cloth.mesh;
+        let mut root: Vec<u32> = (0..mesh.uv.len() as u32).collect();
+        let links = mesh.seams.iter().flat_map(|s| &s.links);
+        let sewn = links.flat_map(|l| [[l.vertex, l.edge[0]], [l.vertex, l.edge[1]]]);
+        for [a, b] in self.edges.iter().copied().chain(sewn) {
+            let (a, b) = (find(&mut root, a), find(&mut root, b));
+            root[a.max(b) as usize] = a.min(b);
+        }
+        let mut parts: Vec<Vec<u32>> = Vec::new();
+        let mut place = vec![0; root.len()];
+        for v in 0..root.len() as u32 {
+            let top = find(&mut root, v);
+            if top == v {
+                place[v as usize] = parts.len();
+                parts.push(Vec::new());
+            }
+            parts[place[top as usize]].push(v);
+        }
+        parts
+    }
+
     /// Mean rest length of the edges [m].
     pub fn mean_edge(&self) -> f64 {
         self.rest_lengths.iter().sum::<f64>() / self.rest_lengths.len().max(1) as f64
@@ -157,6 +180,17 @@ impl System {
         }
         gap
     }
+}
+
+/// The vertex that stands for the part of `v`.
+fn find(root: &mut [u32], v: u32) -> u32 {
+    let mut top = v;
+    while root[top as usize] != top {
+        // halves the way for those who come later
+        root[top as usize] = root[root[top as usize] as usize];
+        top = root[top as usize];
+    }
+    top
 }
 
 fn terms(cloth: &Cloth, options: &BuildOptions) -> Result<Vec<Box<dyn Term>>> {

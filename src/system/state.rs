@@ -80,4 +80,6 @@ pub struct PairAnchor {
     pub offset: Vec3,
     /// Normal force of the last accepted step [N].
     pub normal_force: f64,
+    /// Distance that the pair pressed from in that step [m].
+    pub rest: f64,
 }

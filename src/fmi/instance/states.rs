@@ -23,7 +23,7 @@ impl Instance {
             stop: self.stop,
             time: self.time,
             stale: self.stale,
-            report: self.results.report,
+            report: self.results.report.clone(),
             snapshot: if self.stale {
                 Vec::new()
             } else {
@@ -64,16 +64,18 @@ impl Instance {
             let mut sim = self.model.compile(&saved.values)?;
             let origin = sim.checkpoint();
             if !saved.stale {
+                drive::settings(&self.model, &saved.applied, &mut sim)?;
                 sim.restore(&saved.snapshot)?;
             }
             (self.sim, self.origin) = (sim, origin);
             self.compiled.clone_from(&saved.values);
             self.broken = false;
         } else if !saved.stale {
-            self.sim.restore(&saved.snapshot)?;
-        }
-        if !saved.stale {
             drive::settings(&self.model, &saved.applied, &mut self.sim)?;
+            if let Err(error) = self.sim.restore(&saved.snapshot) {
+                drive::settings(&self.model, &self.applied, &mut self.sim)?;
+                return Err(error.into());
+            }
         }
         self.mode = saved.mode;
         self.values = saved.values;

@@ -68,7 +68,7 @@ impl Table {
             (
                 "step.outcome",
                 Quantity::Outcome,
-                "how the last step or drape ended: 0 converged, 1 in substeps, 2 iteration limit",
+                "how the last step or drape ended: 0 converged, 1 in substeps, 2 iteration limit, 4 stalled, 5 falling",
             ),
             (
                 "step.newton_iterations",

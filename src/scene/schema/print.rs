@@ -42,8 +42,9 @@ pub fn text() -> String {
         };
         let _ = writeln!(
             out,
-            "  {}\n      number{unit}, default: {}, from {} to {}\n      {}",
+            "  {}\n      {}{unit}, default: {}, from {} to {}\n      {}",
             k.name,
+            if k.whole { "whole number" } else { "number" },
             k.default,
             k.min,
             k.max,
@@ -117,7 +118,7 @@ fn nested(path: &str, k: &Key) -> Value {
             .iter()
             .map(|k| {
                 let value = json!({
-                    "type": "number", "minimum": k.min, "maximum": k.max,
+                    "type": if k.whole { "integer" } else { "number" }, "minimum": k.min, "maximum": k.max,
                     "default": k.default,
                     "description": format!("{} [{}]", k.doc.trim(), k.unit),
                 });
