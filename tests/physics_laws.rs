@@ -443,6 +443,8 @@ fn a_refused_or_failed_call_leaves_the_state_as_it_was() {
     // a step that cannot be cut as far as it would have to be
     sim.set_number("solver.step.min", 0.02).unwrap();
     sim.set_number("solver.newton.max_iterations", 1.0).unwrap();
+    // a snapshot has the tunables too
+    let before = sim.save().unwrap();
     errors.push(sim.step(0.03).unwrap_err());
     assert!(sim.save().unwrap() == before, "a failed step left a trace");
     for error in &errors {
