@@ -3,9 +3,9 @@
  *
  * This file is generated from the library's sources; do not edit it.
  *
- * Handles. toile_garment, toile_body and toile_sim are opaque and are only handed back to the
- *   library. A handle that is NULL, freed, or of another kind is TOILE_E_HANDLE, never a crash.
- *   The caller frees handles and nothing else.
+ * Handles. toile_garment, toile_body, toile_sim and toile_array are opaque and are only handed
+ *   back to the library. A handle that is NULL, freed, or of another kind is TOILE_E_HANDLE, never
+ *   a crash. The caller frees handles and nothing else.
  * Results. Every call that can fail returns a toile_status, 0 or a negative error, and gives its
  *   results by out-parameters. toile_last_error() says what went wrong, where, the limit and the
  *   value. After any error but TOILE_E_PANIC the object is exactly as it was before the call.
@@ -16,8 +16,9 @@
  *   `*needed` gets the number of elements; then the caller passes an array of at least that
  *   `capacity`. TOILE_E_SIZE: the array is too small, nothing was written to it, and `*needed`
  *   says what it takes. Views point into the library and are valid until the next call on that
- *   handle whose handle is not const. Pointers must be NULL or valid for the stated count, arrays
- *   aligned as their type asks. Text is UTF-8.
+ *   handle whose handle is not const; what a toile_array holds is there, and the same, until
+ *   toile_array_free. Pointers must be NULL or valid for the stated count, arrays aligned as their
+ *   type asks. Text is UTF-8.
  * Threads. Calls whose handle is const may run beside each other; a call whose handle is not const
  *   needs the handle for itself; different handles are independent. Breaking this is TOILE_E_BUSY.
  * Units. SI throughout: m, kg, s, N, Pa, rad. Arrays are row-major, three numbers per point,
@@ -185,6 +186,11 @@
  * The host asked to stop; the state is admissible.
  */
 #define TOILE_OUTCOME_CANCELLED 3
+
+/**
+ * An array that stays as it was.
+ */
+typedef struct toile_array toile_array;
 
 /**
  * A body that cloth meets: a signed distance field, negative inside. Never changes.
@@ -1281,6 +1287,28 @@ toile_status toile_sim_backend(const struct toile_sim *sim,
                                char *out,
                                size_t capacity,
                                size_t *needed);
+
+/**
+ * Positions of the vertices [m] as they are now, shape [vertex_count, 3], kept as they are until
+ * toile_array_free, whatever happens to the simulation. No copy is made now; the next call that
+ * changes the simulation makes one if the array is still there.
+ */
+toile_status toile_sim_positions_array(const struct toile_sim *sim, struct toile_array **out);
+
+/**
+ * Velocities of the vertices [m/s], shape [vertex_count, 3], kept like toile_sim_positions_array.
+ */
+toile_status toile_sim_velocities_array(const struct toile_sim *sim, struct toile_array **out);
+
+/**
+ * Where the numbers of an array lie. They are there, and the same, until toile_array_free.
+ */
+toile_status toile_array_view(const struct toile_array *array, struct toile_view_f64 *out);
+
+/**
+ * Frees an array; NULL is allowed.
+ */
+void toile_array_free(struct toile_array *array);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -26,6 +26,8 @@ mod body_mesh;
 mod body_shapes;
 #[path = "c_examples.rs"]
 mod c_examples;
+#[path = "capi_array.rs"]
+mod capi_array;
 #[path = "capi_contract.rs"]
 mod capi_contract;
 #[path = "capi_random_calls.rs"]

@@ -30,11 +30,9 @@ pub unsafe extern "C" fn toile_sim_vertex_count(
     out_count: *mut u32,
 ) -> toile_status {
     entry!({
-        let object = SIMS.get(sim.addr())?;
-        input::target(out_count, "out_count")?;
-        let count = object.read(|o| Ok(o.sim.positions().len() as u32))?;
-        output::put(out_count, count);
-        Ok(())
+        output::count(&SIMS, sim.addr(), out_count, "vertices", |o| {
+            o.sim.positions().len()
+        })
     })
 }
 
@@ -45,11 +43,9 @@ pub unsafe extern "C" fn toile_sim_triangle_count(
     out_count: *mut u32,
 ) -> toile_status {
     entry!({
-        let object = SIMS.get(sim.addr())?;
-        input::target(out_count, "out_count")?;
-        let count = object.read(|o| Ok(o.sim.triangles().len() as u32))?;
-        output::put(out_count, count);
-        Ok(())
+        output::count(&SIMS, sim.addr(), out_count, "triangles", |o| {
+            o.sim.triangles().len()
+        })
     })
 }
 
@@ -60,11 +56,9 @@ pub unsafe extern "C" fn toile_sim_body_count(
     out_count: *mut u32,
 ) -> toile_status {
     entry!({
-        let object = SIMS.get(sim.addr())?;
-        input::target(out_count, "out_count")?;
-        let count = object.read(|o| Ok(o.sim.body_count() as u32))?;
-        output::put(out_count, count);
-        Ok(())
+        output::count(&SIMS, sim.addr(), out_count, "bodies", |o| {
+            o.sim.body_count()
+        })
     })
 }
 

@@ -1,5 +1,6 @@
 //! Simulations: made, put into a world, edited, saved, restored.
 
+use super::array::Lent;
 use super::body::BODIES;
 use super::desc;
 use super::garment::{self, GARMENTS};
@@ -21,8 +22,16 @@ use std::ptr;
 pub(super) struct SimObject {
     pub(super) sim: Sim,
     log: Log,
-    /// Calls that failed, left the state as it was, but elsewhere in memory.
+    /// Arrays that hosts hold.
+    pub(super) lent: Lent,
+    /// Calls that left the state as it was, but elsewhere in memory.
     moved: u64,
+}
+
+impl Drop for SimObject {
+    fn drop(&mut self) {
+        self.lent.settle(&mut self.sim);
+    }
 }
 
 impl SimObject {
@@ -46,13 +55,15 @@ pub(super) fn write<R>(
     SIMS.get(sim.addr())?.write(|object| {
         let log = object.log;
         let place = |sim: &Sim| (sim.positions().as_ptr(), sim.velocities().as_ptr());
-        let before = place(&object.sim);
-        f(&mut object.sim, &log).inspect_err(|error| {
-            if place(&object.sim) != before {
-                object.moved += 1;
-            }
+        let before = (place(&object.sim), object.sim.epoch());
+        object.lent.settle(&mut object.sim);
+        let result = f(&mut object.sim, &log).inspect_err(|error| {
             log.say(TOILE_LOG_ERROR, || error.message.clone());
-        })
+        });
+        if object.sim.epoch() == before.1 && place(&object.sim) != before.0 {
+            object.moved += 1;
+        }
+        result
     })
 }
 
@@ -94,7 +105,13 @@ unsafe fn give(sim: Sim, log: Log, out: *mut *mut toile_sim) -> Result<()> {
     for note in sim.info().notes {
         log.say(TOILE_LOG_WARNING, || note.clone());
     }
-    let handle = ptr::without_provenance_mut(SIMS.insert(SimObject { sim, log, moved: 0 })?);
+    let object = SimObject {
+        sim,
+        log,
+        lent: Lent::default(),
+        moved: 0,
+    };
+    let handle = ptr::without_provenance_mut(SIMS.insert(object)?);
     // SAFETY: checked by the caller.
     unsafe { output::put(out, handle) };
     Ok(())

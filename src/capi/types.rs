@@ -26,6 +26,12 @@ pub struct toile_sim {
     _private: [u8; 0],
 }
 
+/// An array that stays as it was.
+#[derive(Debug)]
+pub struct toile_array {
+    _private: [u8; 0],
+}
+
 /// A straight edge.
 pub const TOILE_EDGE_LINE: u32 = 0;
 /// A quadratic Bezier curve; controls are the control point u, v [m] and two ignored numbers.

@@ -153,11 +153,6 @@ impl Model {
         Ok((model, sim))
     }
 
-    /// Values of all variables before anything is set.
-    pub fn start_values(&self) -> Vec<f64> {
-        self.variables.iter().map(|v| v.start).collect()
-    }
-
     /// The variable of a value reference.
     pub fn variable(&self, reference: u32) -> Result<&Variable> {
         self.variables.get(reference as usize).ok_or_else(|| {
@@ -168,7 +163,7 @@ impl Model {
         })
     }
 
-    /// Whether two lists of values ask for different simulations.
+    /// Whether two lists of scalars ask for different simulations.
     pub fn differ(&self, a: &[f64], b: &[f64]) -> bool {
         self.variables
             .iter()

@@ -30,6 +30,11 @@ pub struct SystemInfo {
     pub backend: String,
 }
 
+fn leave(points: &mut Vec<Vec3>) -> Vec<Vec3> {
+    let copy = points.clone();
+    std::mem::replace(points, copy)
+}
+
 impl Sim {
     /// Changes with every call that may invalidate a view.
     pub fn epoch(&self) -> u64 {
@@ -49,6 +54,17 @@ impl Sim {
     /// Vertex velocities [m/s].
     pub fn velocities(&self) -> &[Vec3] {
         &self.state.velocities
+    }
+
+    /// The memory of the positions, for those who need them to stay; the simulation goes on with a
+    /// copy.
+    pub fn leave_positions(&mut self) -> Vec<Vec3> {
+        leave(&mut self.state.positions)
+    }
+
+    /// The memory of the velocities, likewise.
+    pub fn leave_velocities(&mut self) -> Vec<Vec3> {
+        leave(&mut self.state.velocities)
     }
 
     /// Unit vertex normals, pointing to the outside of the cloth.

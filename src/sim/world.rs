@@ -109,6 +109,15 @@ impl Sim {
         Ok(())
     }
 
+    /// Puts the vertices of a deforming mesh somewhere at once, as `place_body` does with a pose.
+    pub fn place_body_vertices(&mut self, body: u32, positions: &[[f64; 3]]) -> Result<()> {
+        let b = check_index(body, self.bodies.len())?;
+        let moved = std::mem::replace(&mut self.state.bodies[b].moved_with_time, false);
+        let placed = self.set_body_vertices(body, positions);
+        self.state.bodies[b].moved_with_time = moved;
+        placed
+    }
+
     /// From here on a pose is a motion, even before the first step.
     pub fn end_placement(&mut self) {
         for body in &mut self.state.bodies {
