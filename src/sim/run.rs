@@ -80,12 +80,6 @@ impl Sim {
         } else {
             Vec::new()
         };
-        for body in &mut self.state.bodies {
-            body.pose = body.target;
-            if !body.target_vertices.is_empty() {
-                body.vertices = std::mem::take(&mut body.target_vertices);
-            }
-        }
         let mut engine = self.engine.lock().unwrap_or_else(PoisonError::into_inner);
         let mut furthest = 0.0_f64;
         let done = drape::drape(

@@ -40,7 +40,7 @@ impl Sim {
 
     /// Where the body is to be at the end of the next step; the cloth feels the velocity that
     /// follows. Before the first step or drape it is a placement: the body stands there at once and
-    /// has no velocity. A drape takes the body to its pose before it begins.
+    /// has no velocity. A drape takes the body to its pose as it begins, and what lies on it along.
     pub fn set_body_pose(&mut self, body: u32, position: [f64; 3], xyzw: [f64; 4]) -> Result<()> {
         let b = check_index(body, self.bodies.len())?;
         finite("position", &position)?;

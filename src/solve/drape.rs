@@ -2,6 +2,7 @@
 
 use super::engine::Engine;
 use super::relax::{RelaxOptions, Relaxed, relax};
+use super::rest::{self, Rest};
 use super::step::{Totals, step};
 use crate::error::{Result, Status};
 use crate::math::Vec3;
@@ -71,6 +72,9 @@ pub fn drape(
     watch: &mut Watch<'_>,
 ) -> Result<Relaxed> {
     engine.begin();
+    if flat {
+        place_bodies(state);
+    }
     let mut all = Relaxed {
         totals: Totals::default(),
         converged: false,
@@ -106,6 +110,9 @@ pub fn drape(
     }
     // a drape that was stopped while it sewed goes on with that
     let open = engine.system.largest_seam_gap(&state.positions) > NEARLY_CLOSED;
+    if open {
+        place_bodies(state);
+    }
     match &carried {
         Some((from, positions)) => transfer(from, positions, engine, state)?,
         None if flat || open => {
@@ -116,7 +123,9 @@ pub fn drape(
     if all.cancelled {
         return stopped(engine, state, all);
     }
-    if !flat && tangled(&engine.system, state) {
+    let crumpled = !flat && tangled(&engine.system, state);
+    if crumpled {
+        place_bodies(state);
         let done = unfold(engine, state, plan, &mut all, watch);
         let restored = engine.soften(1.0);
         let done = done?;
@@ -125,14 +134,35 @@ pub fn drape(
             return stopped(engine, state, all);
         }
     }
+    let small = engine.system.cloth.masses.len() <= rest::LARGEST;
+    let mut reached = Rest::None;
+    if small && !flat && !open && !crumpled {
+        let mut watch = |residual| watch(REST.0, "rest", residual);
+        reached = rest::settle(engine, state, plan, &mut all.totals, &mut watch)?;
+    }
+    place_bodies(state);
+    if reached == Rest::Cancelled {
+        all.cancelled = true;
+        return stopped(engine, state, all);
+    }
     let options = settle_options(plan, plan.force_tolerance);
     for round in 0..ROUNDS {
-        let done = stage(engine, state, &options, REST, "rest", &mut all, watch)?;
-        all.converged = done.converged;
-        if !done.converged || done.cancelled || round + 1 == ROUNDS {
+        if reached == Rest::None {
+            let done = stage(engine, state, &options, REST, "rest", &mut all, watch)?;
+            all.converged = done.converged;
+            if !done.converged || done.cancelled {
+                break;
+            }
+        }
+        all.converged = true;
+        if reached == Rest::Minimum
+            || round + 1 == ROUNDS
+            || small && engine.is_minimum(state, rest::LONGEST)?
+        {
             break;
         }
-        // Newton's method may stop at an equilibrium that the least motion leaves
+        reached = Rest::None;
+        // the least motion may leave an equilibrium that is no minimum
         let rested = state.positions.clone();
         let probed = probe(engine, state, &mut all)?;
         let moved = state
@@ -149,6 +179,16 @@ pub fn drape(
         Ok(all)
     } else {
         stopped(engine, state, all)
+    }
+}
+
+/// Puts bodies where they are to be, without carrying the cloth along.
+fn place_bodies(state: &mut State) {
+    for body in &mut state.bodies {
+        body.pose = body.target;
+        if !body.target_vertices.is_empty() {
+            body.vertices = std::mem::take(&mut body.target_vertices);
+        }
     }
 }
 

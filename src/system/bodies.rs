@@ -129,6 +129,12 @@ impl BodySet {
         }
     }
 
+    /// Whether a body moves or changes its shape over the substep.
+    pub fn is_moving(&self, body: usize) -> bool {
+        let entry = &self.entries[body];
+        entry.from != entry.to || entry.start_vertices != entry.end_vertices
+    }
+
     /// Length of the path of a point over the substep, seen from the body; infinite for a body that
     /// changes its shape.
     pub fn travel(&self, body: usize, x0: &Vec3, x: &Vec3) -> f64 {
@@ -204,13 +210,7 @@ impl Bodies for BodySet {
 
     fn distance(&self, body: usize, point: &Vec3) -> Distance {
         let entry = &self.entries[body];
-        let d = entry.end.distance(&entry.to.to_body(point));
-        let r = entry.to.rotation.to_rotation_matrix();
-        Distance {
-            value: d.value,
-            gradient: r * d.gradient,
-            hessian: r.matrix() * d.hessian * r.matrix().transpose(),
-        }
+        distance(&entry.end, &entry.to, point)
     }
 
     fn value(&self, body: usize, point: &Vec3) -> f64 {
@@ -235,6 +235,43 @@ impl Bodies for BodySet {
 
     fn contact(&self, body: usize) -> &ContactSettings {
         &self.entries[body].contact
+    }
+}
+
+/// The bodies as they are at the start of the substep.
+pub struct AtStart<'a>(pub &'a BodySet);
+
+impl Bodies for AtStart<'_> {
+    fn count(&self) -> usize {
+        self.0.count()
+    }
+
+    fn distance(&self, body: usize, point: &Vec3) -> Distance {
+        let entry = &self.0.entries[body];
+        distance(&entry.start, &entry.from, point)
+    }
+
+    fn value(&self, body: usize, point: &Vec3) -> f64 {
+        self.0.value_at_start(body, point)
+    }
+
+    fn carried(&self, _: usize, point: &Vec3) -> Vec3 {
+        *point
+    }
+
+    fn contact(&self, body: usize) -> &ContactSettings {
+        self.0.contact(body)
+    }
+}
+
+/// Distance to a body in a pose, derivatives by world coordinates.
+fn distance(body: &Body, pose: &Pose, point: &Vec3) -> Distance {
+    let d = body.distance(&pose.to_body(point));
+    let r = pose.rotation.to_rotation_matrix();
+    Distance {
+        value: d.value,
+        gradient: r * d.gradient,
+        hessian: r.matrix() * d.hessian * r.matrix().transpose(),
     }
 }
 

@@ -141,6 +141,18 @@ pub trait Term: Send + Sync {
     fn gradient(&self, e: usize, at: &Configuration<'_>, out: &mut [Vec3]);
     /// Its second derivative [N/m].
     fn hessian(&self, e: usize, at: &Configuration<'_>, kind: HessianKind, out: &mut [Mat3]);
+    /// Gradient and Hessian together, for terms that save by it.
+    fn derivatives(
+        &self,
+        e: usize,
+        at: &Configuration<'_>,
+        kind: HessianKind,
+        gradient: &mut [Vec3],
+        hessian: &mut [Mat3],
+    ) {
+        self.gradient(e, at, gradient);
+        self.hessian(e, at, kind, hessian);
+    }
     /// Directional derivative of `gradient` by rest shape and parameters.
     fn rest_gradient(
         &self,
