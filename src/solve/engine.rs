@@ -55,7 +55,7 @@ pub enum Motion {
 impl Engine {
     /// A solver for a system.
     pub fn new(system: System, settings: &Settings) -> Self {
-        let n = system.cloth.mesh.uv.len();
+        let n = system.points.count();
         let assembler = Assembler::new(n, &system.terms);
         let workers = Workers::new(settings.threads as usize);
         let linear = linear_solver(&system, settings, &workers);
@@ -85,7 +85,7 @@ impl Engine {
         self.system.set_options(&settings.into())?;
         self.settings = settings.clone();
         self.assembler
-            .rebuild(self.system.cloth.mesh.uv.len(), &self.system.terms);
+            .rebuild(self.system.points.count(), &self.system.terms);
         Ok(())
     }
 
@@ -97,7 +97,7 @@ impl Engine {
         };
         self.system.set_options(&options)?;
         self.assembler
-            .rebuild(self.system.cloth.mesh.uv.len(), &self.system.terms);
+            .rebuild(self.system.points.count(), &self.system.terms);
         Ok(())
     }
 
@@ -153,12 +153,18 @@ impl Engine {
         let dynamic = motion == Motion::Dynamic;
         let inv_dt = if dynamic { 1.0 / h } else { 0.0 };
         for i in 0..n {
-            let alpha = if dynamic { system.damping[i] } else { 0.0 };
-            self.weight[i] = system.cloth.masses[i] * (1.0 / (h * h) + alpha / h);
+            let alpha = if dynamic {
+                system.points.damping[i]
+            } else {
+                0.0
+            };
+            self.weight[i] = system.points.masses[i] * (1.0 / (h * h) + alpha / h);
             self.center[i] = state.positions[i] + state.velocities[i] * (h / (1.0 + alpha * h));
         }
         let mut x = state.positions.clone();
-        self.fixed.fill(false);
+        for (i, fixed) in self.fixed.iter_mut().enumerate() {
+            *fixed = !system.points.moves(i);
+        }
         for pin in &state.pins {
             let i = pin.vertex as usize;
             self.fixed[i] = true;

@@ -8,6 +8,7 @@ use super::contact::self_contact::SelfContact;
 use super::gravity::Gravity;
 use super::hinge::Hinge;
 use super::membrane::Membrane;
+use super::points::Points;
 use super::pressure::Pressure;
 use super::quadratic_bending::QuadraticBending;
 use super::seam_term::{SeamHinge, SeamSprings};
@@ -15,11 +16,16 @@ use super::term::{Bodies, Term};
 use crate::cloth::Cloth;
 use crate::error::Result;
 use crate::math::{Vec3, topology};
+use crate::yarn::Yarns;
 
 /// A compiled garment.
 pub struct System {
-    /// Rest data.
+    /// Rest data of the triangle part.
     pub cloth: Cloth,
+    /// Rest data of the yarns, if there are any.
+    pub yarns: Option<Yarns>,
+    /// Vertices and nodes.
+    pub points: Points,
     /// Energies.
     pub terms: Vec<Box<dyn Term>>,
     /// Bodies of the world.
@@ -28,8 +34,6 @@ pub struct System {
     pub edges: Vec<[u32; 2]>,
     /// Their rest lengths [m].
     pub rest_lengths: Vec<f64>,
-    /// Mass-proportional damping of each vertex [1/s].
-    pub damping: Vec<f64>,
     options: BuildOptions,
 }
 
@@ -53,25 +57,28 @@ pub struct BuildOptions {
 }
 
 impl System {
-    /// Compiles rest data; bodies come later.
+    /// Compiles a garment of triangles alone; bodies come later.
     pub fn new(cloth: Cloth, options: &BuildOptions) -> Result<Self> {
-        let terms = terms(&cloth, options)?;
+        Self::with_yarns(cloth, None, options)
+    }
+
+    /// Compiles a garment whose yarns are simulated where the cloth has no triangles.
+    pub fn with_yarns(cloth: Cloth, yarns: Option<Yarns>, options: &BuildOptions) -> Result<Self> {
+        let points = Points::new(&cloth, yarns.as_ref());
+        let terms = terms(&cloth, &points, yarns.as_ref(), options)?;
         let edges = topology::edges(&cloth.mesh.triangles);
         let rest_lengths = edges
             .iter()
             .map(|e| (cloth.mesh.uv[e[1] as usize] - cloth.mesh.uv[e[0] as usize]).norm())
             .collect();
-        let mut damping = vec![0.0; cloth.mesh.uv.len()];
-        for (d, panel) in damping.iter_mut().zip(&cloth.mesh.vertex_panel) {
-            *d = cloth.fabrics[cloth.panel_fabric[*panel as usize]].damping_mass;
-        }
         Ok(Self {
             cloth,
+            yarns,
+            points,
             terms,
             bodies: BodySet::default(),
             edges,
             rest_lengths,
-            damping,
             options: options.clone(),
         })
     }
@@ -79,7 +86,7 @@ impl System {
     /// Takes changed options; terms that carry them are built anew.
     pub fn set_options(&mut self, options: &BuildOptions) -> Result<()> {
         if *options != self.options {
-            self.terms = terms(&self.cloth, options)?;
+            self.terms = terms(&self.cloth, &self.points, self.yarns.as_ref(), options)?;
             self.options = options.clone();
         }
         Ok(())
@@ -159,11 +166,16 @@ impl System {
     }
 }
 
-fn terms(cloth: &Cloth, options: &BuildOptions) -> Result<Vec<Box<dyn Term>>> {
+fn terms(
+    cloth: &Cloth,
+    points: &Points,
+    yarns: Option<&Yarns>,
+    options: &BuildOptions,
+) -> Result<Vec<Box<dyn Term>>> {
     let mut terms: Vec<Box<dyn Term>> = vec![
         Box::new(Gravity::new(cloth)),
         Box::new(Membrane::new(cloth, options.softening)),
-        Box::new(BodyContact::new(cloth)),
+        Box::new(BodyContact::new(points)),
         Box::new(EdgeContact::new(cloth)),
     ];
     for bending in Hinge::terms(cloth) {
@@ -192,6 +204,8 @@ fn terms(cloth: &Cloth, options: &BuildOptions) -> Result<Vec<Box<dyn Term>>> {
         let friction = cloth.fabrics.iter().map(|f| f.friction).fold(0.0, f64::max);
         terms.push(Box::new(SelfContact::new(
             cloth,
+            points,
+            yarns,
             options.self_stiffness,
             friction,
         )?));

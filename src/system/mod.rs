@@ -12,6 +12,7 @@ pub mod contact;
 pub mod gravity;
 pub mod hinge;
 pub mod membrane;
+pub mod points;
 pub mod pressure;
 pub mod quadratic_bending;
 pub mod seam_term;

@@ -79,6 +79,8 @@ pub(crate) fn squares(panels: usize, cells: usize, spacing: f64) -> Cloth {
     let mut cloth = Cloth {
         vertex_areas: vec![0.0; mesh.uv.len()],
         masses: vec![0.0; mesh.uv.len()],
+        panel_fabric: vec![0; panels],
+        fabrics: vec![toile::pattern::Fabric::default()],
         mesh,
         ..Cloth::default()
     };
