@@ -12,7 +12,9 @@ use super::points::Points;
 use super::pressure::Pressure;
 use super::quadratic_bending::QuadraticBending;
 use super::seam_term::{SeamHinge, SeamSprings};
+use super::state::State;
 use super::term::{Bodies, Term};
+use super::yarn::Unknowns;
 use crate::cloth::Cloth;
 use crate::error::Result;
 use crate::math::{Vec3, topology};
@@ -26,6 +28,9 @@ pub struct System {
     pub yarns: Option<Yarns>,
     /// Vertices and nodes.
     pub points: Points,
+    /// Blocks of the yarns' unknowns, after those of the vertices.
+    pub unknowns: Unknowns,
+    sliding: Vec<bool>,
     /// Energies.
     pub terms: Vec<Box<dyn Term>>,
     /// Bodies of the world.
@@ -65,6 +70,8 @@ impl System {
     /// Compiles a garment whose yarns are simulated where the cloth has no triangles.
     pub fn with_yarns(cloth: Cloth, yarns: Option<Yarns>, options: &BuildOptions) -> Result<Self> {
         let points = Points::new(&cloth, yarns.as_ref());
+        let sliding = vec![false; yarns.as_ref().map_or(0, |y| y.mesh.incidences.len())];
+        let unknowns = unknowns(&cloth, yarns.as_ref(), &sliding)?;
         let terms = terms(&cloth, &points, yarns.as_ref(), options)?;
         let edges = topology::edges(&cloth.mesh.triangles);
         let rest_lengths = edges
@@ -75,6 +82,8 @@ impl System {
             cloth,
             yarns,
             points,
+            unknowns,
+            sliding,
             terms,
             bodies: BodySet::default(),
             edges,
@@ -90,6 +99,56 @@ impl System {
             self.options = options.clone();
         }
         Ok(())
+    }
+
+    /// Number of blocks of unknowns: points, then sliding coordinates.
+    pub fn block_count(&self) -> usize {
+        self.points.count() + self.unknowns.slide_blocks()
+    }
+
+    /// Takes which yarns slide where; true if unknowns have come or gone.
+    pub fn set_sliding(&mut self, sliding: &[bool]) -> Result<bool> {
+        if *sliding == *self.sliding {
+            return Ok(false);
+        }
+        self.unknowns = unknowns(&self.cloth, self.yarns.as_ref(), sliding)?;
+        self.sliding.clear();
+        self.sliding.extend_from_slice(sliding);
+        self.terms = terms(
+            &self.cloth,
+            &self.points,
+            self.yarns.as_ref(),
+            &self.options,
+        )?;
+        Ok(true)
+    }
+
+    /// Values of all blocks in a state.
+    pub fn pack(&self, state: &State, x: &mut Vec<Vec3>) {
+        x.clear();
+        x.extend_from_slice(&state.positions);
+        x.resize(self.block_count(), Vec3::zeros());
+        for (u, slot) in state.u.iter().zip(&self.unknowns.slides) {
+            if let Some((block, c)) = slot {
+                x[*block as usize][usize::from(*c)] = *u;
+            }
+        }
+    }
+
+    /// Writes blocks that have moved from `start` to `x` in the time `h` [s] back into a state.
+    pub fn unpack(&self, start: &[Vec3], x: &[Vec3], h: f64, state: &mut State) {
+        for i in 0..self.points.count() {
+            state.positions[i] = x[i];
+            state.velocities[i] = (x[i] - start[i]) / h;
+        }
+        for (i, slot) in self.unknowns.slides.iter().enumerate() {
+            state.u_rates[i] = 0.0;
+            if let Some((block, c)) = slot {
+                let (block, c) = (*block as usize, usize::from(*c));
+                state.u[i] = x[block][c];
+                state.u_rates[i] = (x[block][c] - start[block][c]) / h;
+            }
+        }
     }
 
     /// Bytes of the mesh and of the rest data, terms not counted.
@@ -164,6 +223,15 @@ impl System {
         }
         gap
     }
+}
+
+fn unknowns(cloth: &Cloth, yarns: Option<&Yarns>, sliding: &[bool]) -> Result<Unknowns> {
+    let Some(yarns) = yarns else {
+        return Ok(Unknowns::default());
+    };
+    let nodes = yarns.mesh.uv.len();
+    let first = cloth.mesh.uv.len();
+    Unknowns::new(&yarns.mesh, first as u32, (first + nodes) as u32, sliding)
 }
 
 fn terms(

@@ -19,3 +19,4 @@ pub mod seam_term;
 pub mod snapshot;
 pub mod state;
 pub mod term;
+pub mod yarn;

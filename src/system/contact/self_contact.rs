@@ -108,7 +108,8 @@ impl SelfContact {
     /// Largest part (0 to 1) of the way from `x0` to `x` on which no cloth can have passed through
     /// cloth.
     pub fn max_travel(&self, x0: &[Vec3], x: &[Vec3]) -> f64 {
-        travel::max_travel(&self.spheres, x0, x)
+        let count = self.spheres.radii.len();
+        travel::max_travel(&self.spheres, &x0[..count], &x[..count])
     }
 
     /// Bytes held.
