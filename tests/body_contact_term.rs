@@ -7,6 +7,7 @@ use toile::pattern::Fabric;
 use toile::system::bodies::BodySet;
 use toile::system::contact::body::BodyContact;
 use toile::system::contact::edge::EdgeContact;
+use toile::system::points::Points;
 use toile::system::state::{BodyAnchor, State};
 use toile::system::term::{Configuration, ContactSettings, HessianKind, Term, World};
 use toile::tri::grid::{SheetPattern, sheet_garment, structured_sheet};
@@ -51,6 +52,10 @@ fn case() -> (Cloth, Case) {
         time: 0.0,
         positions: x.clone(),
         velocities: vec![Vec3::zeros(); x.len()],
+        u: Vec::new(),
+        u_rates: Vec::new(),
+        sliding: Vec::new(),
+        strands: Vec::new(),
         pins: Vec::new(),
         bodies: vec![entry],
         body_anchors: anchors,
@@ -147,7 +152,7 @@ fn check(term: &mut dyn Term, case: &Case) {
 #[test]
 fn vertex_contact_forces_are_derivatives_of_the_energy() {
     let (cloth, case) = case();
-    check(&mut BodyContact::new(&cloth), &case);
+    check(&mut BodyContact::new(&Points::new(&cloth, None)), &case);
 }
 
 #[test]
@@ -173,7 +178,7 @@ fn wrench_on_a_body_is_the_reaction_of_the_cloth() {
         world: &world,
     };
     let terms: [Box<dyn Term>; 2] = [
-        Box::new(BodyContact::new(&cloth)),
+        Box::new(BodyContact::new(&Points::new(&cloth, None))),
         Box::new(EdgeContact::new(&cloth)),
     ];
     for mut term in terms {

@@ -12,6 +12,7 @@ use toile::math::{Mat3, Vec3};
 use toile::solve::linear::choose::solver;
 use toile::system::contact::crossing::{crossings, crossings_with, passes};
 use toile::system::contact::self_contact::SelfContact;
+use toile::system::points::Points;
 use toile::system::state::State;
 use toile::system::term::{HessianKind, Term};
 
@@ -149,7 +150,14 @@ fn implicit(sheets: &Sheets, contact: &SelfContact, dt: f64) -> Vec<Vec3> {
 /// A sheet thrown down onto the other, steps cut by `max_travel`.
 fn throw(speed: f64, stiffness: f64, dt: f64, time: f64) -> Outcome {
     let mut sheets = sheets(speed);
-    let mut contact = SelfContact::new(&sheets.cloth, stiffness, 0.3).expect("valid");
+    let mut contact = SelfContact::new(
+        &sheets.cloth,
+        &Points::new(&sheets.cloth, None),
+        None,
+        stiffness,
+        0.3,
+    )
+    .expect("valid");
     let mut outcome = Outcome {
         crossed: 0,
         touched: 0,
@@ -214,7 +222,8 @@ fn sheets_thrown_at_each_other_do_not_cross() {
 fn travel_is_cut_where_sheets_would_pass() {
     let cloth = squares(2, CELLS, SPACING);
     let half = cloth.mesh.uv.len() / 2;
-    let contact = SelfContact::new(&cloth, 1e6, 0.3).expect("valid");
+    let contact =
+        SelfContact::new(&cloth, &Points::new(&cloth, None), None, 1e6, 0.3).expect("valid");
     let place = |height: f64| -> Vec<Vec3> {
         cloth
             .mesh
@@ -247,7 +256,8 @@ fn travel_is_cut_where_sheets_would_pass() {
 #[test]
 fn travel_agrees_with_brute_force() {
     let cloth = squares(2, 4, SPACING);
-    let contact = SelfContact::new(&cloth, 1e6, 0.3).expect("valid");
+    let contact =
+        SelfContact::new(&cloth, &Points::new(&cloth, None), None, 1e6, 0.3).expect("valid");
     let spheres = contact.spheres();
     let mut cut = 0;
     for seed in 0..30 {
@@ -400,7 +410,8 @@ fn twenty_thousand_triangles_are_searched() {
     let checked = start.elapsed();
     assert!(found.is_empty());
     let start = Instant::now();
-    let mut contact = SelfContact::new(&cloth, 1e6, 0.3).expect("valid");
+    let mut contact =
+        SelfContact::new(&cloth, &Points::new(&cloth, None), None, 1e6, 0.3).expect("valid");
     let built = start.elapsed();
     let mut state = state(x.clone());
     for (v, p) in state.velocities.iter_mut().zip(&x) {

@@ -6,6 +6,7 @@ use crate::self_contact_cases::{Random, at, sew, squares, state};
 use toile::math::{Mat3, Vec3};
 use toile::system::contact::self_contact::SelfContact;
 use toile::system::contact::spheres::{Grid, Spheres, covering_radius};
+use toile::system::points::Points;
 use toile::system::state::State;
 use toile::system::term::{HessianKind, Term};
 
@@ -22,7 +23,8 @@ fn crumpled(seed: u64, gap: f64) -> (SelfContact, State) {
         Vec3::new(p.x + shift, up, p.y + 0.6 * shift) + random.vector() * (0.1 * SPACING)
     });
     let x = x.collect();
-    let contact = SelfContact::new(&cloth, 1e6, 0.4).expect("valid");
+    let contact =
+        SelfContact::new(&cloth, &Points::new(&cloth, None), None, 1e6, 0.4).expect("valid");
     (contact, state(x))
 }
 
@@ -183,7 +185,7 @@ fn no_place_of_an_edge_or_triangle_is_out_of_reach() {
         assert!(worst > 0.85 * cover, "{worst} is far below {cover}");
     }
     let cloth = squares(1, 5, SPACING);
-    let spheres = Spheres::new(&cloth, 0.15).expect("valid");
+    let spheres = Spheres::new(&cloth, &Points::new(&cloth, None), None, 0.15).expect("valid");
     let edges = toile::math::topology::edges(&cloth.mesh.triangles);
     let length =
         |e: &[u32; 2]| (cloth.mesh.uv[e[0] as usize] - cloth.mesh.uv[e[1] as usize]).norm();
@@ -224,7 +226,8 @@ fn neighbours_across_a_seam_do_not_meet() {
                 Vec3::new(p.x + second * width, 0.0, p.y + second * 0.5 * SPACING)
             })
             .collect();
-        let mut contact = SelfContact::new(&cloth, 1e6, 0.3).expect("valid");
+        let mut contact =
+            SelfContact::new(&cloth, &Points::new(&cloth, None), None, 1e6, 0.3).expect("valid");
         let state = state(x.clone());
         contact.begin_step(&state, &at(&x, &x, 1e-3));
         let touching = (0..contact.stencils().count())
@@ -251,7 +254,8 @@ fn far_parts_of_one_panel_meet() {
             Vec3::new(-s.abs(), if s > 0.0 { 0.3 * SPACING } else { 0.0 }, p.y)
         })
         .collect();
-    let mut contact = SelfContact::new(&cloth, 1e6, 0.3).expect("valid");
+    let mut contact =
+        SelfContact::new(&cloth, &Points::new(&cloth, None), None, 1e6, 0.3).expect("valid");
     let state = state(x.clone());
     contact.begin_step(&state, &at(&x, &x, 1e-3));
     let mut lift = 0.0;
@@ -278,7 +282,8 @@ fn coincident_panels_are_parted() {
         .collect();
     let state = state(x.clone());
     let forces = || {
-        let mut contact = SelfContact::new(&cloth, 1e6, 0.3).expect("valid");
+        let mut contact =
+            SelfContact::new(&cloth, &Points::new(&cloth, None), None, 1e6, 0.3).expect("valid");
         contact.begin_step(&state, &at(&x, &x, 1e-3));
         let mut f = vec![Vec3::zeros(); x.len()];
         for e in 0..contact.stencils().count() {
@@ -370,7 +375,7 @@ fn bad_numbers_are_refused() {
         (1.0, f64::INFINITY),
         (1.0, -0.1),
     ] {
-        assert!(SelfContact::new(&cloth, k, mu).is_err());
+        assert!(SelfContact::new(&cloth, &Points::new(&cloth, None), None, k, mu).is_err());
     }
-    assert!(Spheres::new(&cloth, -0.1).is_err());
+    assert!(Spheres::new(&cloth, &Points::new(&cloth, None), None, -0.1).is_err());
 }

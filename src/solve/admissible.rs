@@ -17,7 +17,8 @@ pub(super) fn inadmissible(
     dynamic: bool,
     workers: &Workers,
 ) -> Option<&'static str> {
-    let (start, x) = (at.x0, at.x);
+    let count = system.points.count();
+    let (start, x) = (&at.x0[..count], &at.x[..count]);
     let mut reasons = vec![None; x.len().div_ceil(CHUNK)];
     for b in 0..system.bodies.count() {
         workers.chunks(&mut reasons, 1, |c, reason| {

@@ -25,7 +25,7 @@ impl Carry {
         bodies: &BodySet,
     ) {
         let x = &state.positions;
-        self.way.resize(x.len(), Vec3::zeros());
+        self.way.resize(center.len(), Vec3::zeros());
         self.held.clear();
         self.held.extend_from_slice(fixed);
         for anchor in &state.body_anchors {

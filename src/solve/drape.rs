@@ -134,7 +134,7 @@ pub fn drape(
             return stopped(engine, state, all);
         }
     }
-    let small = engine.system.cloth.masses.len() <= rest::LARGEST;
+    let small = engine.system.block_count() <= rest::LARGEST;
     let mut reached = Rest::None;
     if small && !flat && !open && !crumpled {
         let mut watch = |residual| watch(REST.0, "rest", residual);

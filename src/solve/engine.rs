@@ -32,8 +32,10 @@ pub struct Engine {
     workers: Workers,
     work: Work,
     weight: Vec<f64>,
+    measure: Vec<f64>,
     center: Vec<Vec3>,
     fixed: Vec<bool>,
+    idle: Vec<(u32, u8)>,
     start: Vec<Vec3>,
     carry: Carry,
 }
@@ -70,7 +72,7 @@ pub enum Motion {
 impl Engine {
     /// A solver for a system.
     pub fn new(system: System, settings: &Settings) -> Self {
-        let n = system.cloth.mesh.uv.len();
+        let n = system.block_count();
         let assembler = Assembler::new(n, &system.terms);
         let workers = Workers::new(settings.threads as usize);
         let linear = linear_solver(&system, settings, &workers);
@@ -80,10 +82,12 @@ impl Engine {
             direct: Direct::new(&workers),
             workers,
             work: Work::default(),
-            weight: vec![0.0; n],
-            center: vec![Vec3::zeros(); n],
-            fixed: vec![false; n],
-            start: vec![Vec3::zeros(); n],
+            weight: Vec::new(),
+            measure: Vec::new(),
+            center: Vec::new(),
+            fixed: Vec::new(),
+            idle: Vec::new(),
+            start: Vec::new(),
             carry: Carry::default(),
             settings: settings.clone(),
             system,
@@ -103,7 +107,7 @@ impl Engine {
         self.system.set_options(&settings.into())?;
         self.settings = settings.clone();
         self.assembler
-            .rebuild(self.system.cloth.mesh.uv.len(), &self.system.terms);
+            .rebuild(self.system.block_count(), &self.system.terms);
         Ok(())
     }
 
@@ -115,7 +119,7 @@ impl Engine {
         };
         self.system.set_options(&options)?;
         self.assembler
-            .rebuild(self.system.cloth.mesh.uv.len(), &self.system.terms);
+            .rebuild(self.system.block_count(), &self.system.terms);
         Ok(())
     }
 
@@ -164,20 +168,17 @@ impl Engine {
         fraction: f64,
         motion: Motion,
     ) -> Result<Attempt> {
-        let n = state.positions.len();
-        let system = &mut self.system;
-        system.bodies.prepare(state, fraction, &self.workers)?;
-        self.start.copy_from_slice(&state.positions);
+        if self.system.set_sliding(&state.sliding)? {
+            self.assembler
+                .rebuild(self.system.block_count(), &self.system.terms);
+        }
         let dynamic = motion == Motion::Dynamic;
         let rest = matches!(motion, Motion::Rest { .. });
         let inv_dt = if dynamic { 1.0 / h } else { 0.0 };
-        for i in 0..n {
-            let alpha = if dynamic { system.damping[i] } else { 0.0 };
-            self.weight[i] = system.cloth.masses[i] * (1.0 / (h * h) + alpha / h);
-            self.center[i] = state.positions[i] + state.velocities[i] * (h / (1.0 + alpha * h));
-        }
-        let mut x = state.positions.clone();
-        self.fixed.fill(false);
+        self.system.bodies.prepare(state, fraction, &self.workers)?;
+        self.system.pack(state, &mut self.start);
+        self.set_inertia(state, h, dynamic);
+        let mut x = self.start.clone();
         for pin in &state.pins {
             let i = pin.vertex as usize;
             self.fixed[i] = true;
@@ -193,8 +194,10 @@ impl Engine {
         self.carry.way.clear();
         if rest {
             self.carry
-                .take_along(state, &self.center, &self.fixed, &system.bodies);
+                .take_along(state, &self.center, &self.fixed, &self.system.bodies);
         }
+        let n = x.len();
+        let system = &mut self.system;
         let world = World {
             gravity: state.gravity,
             wind: state.wind,
@@ -224,8 +227,10 @@ impl Engine {
             inertia: Inertia {
                 weight: &self.weight,
                 center: &self.center,
+                measure: &self.measure,
             },
             fixed: &self.fixed,
+            idle: &self.idle,
             workers: &self.workers,
         };
         let tolerance = Tolerance {
@@ -333,10 +338,7 @@ impl Engine {
                 term.accept(&at, state);
             }
         }
-        for i in 0..n {
-            state.velocities[i] = (x[i] - self.start[i]) / h;
-        }
-        state.positions = x;
+        system.unpack(&self.start, &x, h, state);
         system.bodies.accept(state);
         Ok(Attempt::Accepted(summary))
     }
@@ -344,14 +346,13 @@ impl Engine {
     /// Whether a state at rest is a minimum of the energy: whether the exact Hessian with the inertia
     /// of a step `h` [s] is positive definite there.
     pub fn is_minimum(&mut self, state: &State, h: f64) -> Result<bool> {
-        self.fixed.fill(false);
-        for pin in &state.pins {
-            self.fixed[pin.vertex as usize] = true;
-        }
-        for (weight, mass) in self.weight.iter_mut().zip(&self.system.cloth.masses) {
-            *weight = mass / (h * h);
-        }
         self.with_present(state, |engine, at| {
+            engine.start.clear();
+            engine.start.extend_from_slice(at.x);
+            engine.set_inertia(state, h, false);
+            for pin in &state.pins {
+                engine.fixed[pin.vertex as usize] = true;
+            }
             let problem = Problem {
                 terms: &engine.system.terms,
                 world: at.world,
@@ -359,9 +360,11 @@ impl Engine {
                 inv_dt: at.inv_dt,
                 inertia: Inertia {
                     weight: &engine.weight,
-                    center: at.x0,
+                    measure: &engine.measure,
+                    center: &engine.center,
                 },
                 fixed: &engine.fixed,
+                idle: &engine.idle,
                 workers: &engine.workers,
             };
             problem.is_convex(
@@ -371,6 +374,48 @@ impl Engine {
                 &mut engine.work,
             )
         })
+    }
+
+    /// The quadratic part of a substep's potential. The terms of yarns bring their own inertia, which
+    /// is not diagonal; a relaxation takes lumped masses in its place.
+    fn set_inertia(&mut self, state: &State, h: f64, dynamic: bool) {
+        let system = &self.system;
+        let points = &system.points;
+        let n = system.block_count();
+        for list in [&mut self.weight, &mut self.measure] {
+            list.clear();
+            list.resize(n, 0.0);
+        }
+        self.center.clone_from(&self.start);
+        self.fixed.clear();
+        self.fixed.resize(n, false);
+        self.idle.clear();
+        for i in 0..points.count() {
+            let alpha = if dynamic { points.damping[i] } else { 0.0 };
+            self.measure[i] = points.masses[i] * (1.0 / (h * h) + alpha / h);
+            if i < points.vertex_count || !dynamic {
+                self.weight[i] = self.measure[i];
+                self.center[i] += state.velocities[i] * (h / (1.0 + alpha * h));
+            }
+            self.fixed[i] = !points.moves(i);
+        }
+        let unknowns = &system.unknowns;
+        for (k, owner) in unknowns.owners.iter().enumerate() {
+            let block = unknowns.first_slide as usize + k;
+            self.measure[block] = points.masses[unknowns.node(*owner) as usize] / (h * h);
+            if !dynamic {
+                self.weight[block] = self.measure[block];
+            }
+            self.idle
+                .extend((unknowns.used[k]..3).map(|c| (block as u32, c)));
+        }
+        if !dynamic {
+            for (i, slot) in unknowns.slides.iter().enumerate() {
+                if let Some((block, c)) = slot {
+                    self.center[*block as usize][usize::from(*c)] += h * state.u_rates[i];
+                }
+            }
+        }
     }
 
     /// Lets friction anchors and normal forces follow the present state.
@@ -400,7 +445,8 @@ impl Engine {
         })
     }
 
-    /// Gradient of the potential in the present state [N], pinned vertices included.
+    /// Gradient of the potential in the present state [N]: points, pinned ones included, then sliding
+    /// coordinates.
     pub fn forces(&mut self, state: &State) -> Result<Vec<Vec3>> {
         self.with_present(state, |engine, at| {
             let mut gradient = vec![Vec3::zeros(); at.x.len()];
@@ -434,6 +480,7 @@ impl Engine {
             body.target = body.pose;
             body.target_vertices.clear();
         }
+        let mut changed = self.system.set_sliding(&state.sliding)?;
         self.system.bodies.prepare(&still, 1.0, &self.workers)?;
         let bodies = self.system.bodies.clone();
         let world = World {
@@ -442,19 +489,19 @@ impl Engine {
             pressure: state.pressure,
             bodies: &bodies,
         };
+        let mut x = Vec::new();
+        self.system.pack(state, &mut x);
         let at = Configuration {
-            x: &state.positions,
-            x0: &state.positions,
+            x: &x,
+            x0: &x,
             inv_dt: 0.0,
             world: &world,
         };
-        let mut changed = false;
         for term in &mut self.system.terms {
             changed |= term.begin_step(state, &at);
         }
         if changed {
-            self.assembler
-                .rebuild(state.positions.len(), &self.system.terms);
+            self.assembler.rebuild(x.len(), &self.system.terms);
         }
         Ok(f(self, &at))
     }

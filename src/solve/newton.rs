@@ -22,6 +22,9 @@ pub struct Inertia<'a> {
     pub weight: &'a [f64],
     /// Where the quadratic part is least [m].
     pub center: &'a [Vec3],
+    /// What inertia resists a force with [N/m]: the weight, or the lumped equal of inertia that
+    /// terms bring.
+    pub measure: &'a [f64],
 }
 
 /// When to stop.
@@ -87,6 +90,8 @@ pub struct Problem<'a> {
     pub inertia: Inertia<'a>,
     /// Vertices that keep their place.
     pub fixed: &'a [bool],
+    /// Block and component of entries that nothing depends on.
+    pub idle: &'a [(u32, u8)],
     /// Threads.
     pub workers: &'a Workers,
 }
@@ -159,7 +164,13 @@ impl Problem<'_> {
         if let Some(way) = way {
             assembler.matrix().add_product(way, gradient);
         }
-        fix_rows(assembler.matrix_mut(), self.fixed);
+        let matrix = assembler.matrix_mut();
+        fix_rows(matrix, self.fixed);
+        for (block, c) in self.idle {
+            let slot = matrix.pattern.starts[*block as usize] as usize;
+            let c = usize::from(*c);
+            matrix.blocks[slot][(c, c)] = 1.0;
+        }
         for (g, fixed) in gradient.iter_mut().zip(self.fixed) {
             if *fixed {
                 g.fill(0.0);
@@ -184,11 +195,10 @@ impl Problem<'_> {
             if self.fixed[i] {
                 continue;
             }
-            let weight = self.inertia.weight[i];
-            *g += (x[i] - self.inertia.center[i]) * weight;
+            *g += (x[i] - self.inertia.center[i]) * self.inertia.weight[i];
             let size = g.norm();
             force = force.max(size);
-            reach = reach.max(size / weight);
+            reach = reach.max(size / self.inertia.measure[i]);
         }
         (force, reach)
     }

@@ -179,7 +179,7 @@ fn kinetic_energy(engine: &Engine, state: &State) -> f64 {
     state
         .velocities
         .iter()
-        .zip(&engine.system.cloth.masses)
+        .zip(&engine.system.points.masses)
         .map(|(v, m)| 0.5 * m * v.norm_squared())
         .sum()
 }

@@ -54,6 +54,7 @@ pub fn settle(
             return Ok(Rest::Cancelled);
         }
         state.velocities.fill(Vec3::zeros());
+        state.u_rates.fill(0.0);
         let mut count = |summary: &Summary| {
             totals.newton_iterations += u64::from(summary.iterations);
             totals.linear_iterations += summary.linear_iterations;

@@ -8,18 +8,29 @@ use super::contact::self_contact::SelfContact;
 use super::gravity::Gravity;
 use super::hinge::Hinge;
 use super::membrane::Membrane;
+use super::points::Points;
 use super::pressure::Pressure;
 use super::quadratic_bending::QuadraticBending;
 use super::seam_term::{SeamHinge, SeamSprings};
+use super::state::State;
 use super::term::{Bodies, Term};
+use super::yarn::Unknowns;
 use crate::cloth::Cloth;
 use crate::error::Result;
 use crate::math::{Vec3, topology};
+use crate::yarn::Yarns;
 
 /// A compiled garment.
 pub struct System {
-    /// Rest data.
+    /// Rest data of the triangle part.
     pub cloth: Cloth,
+    /// Rest data of the yarns, if there are any.
+    pub yarns: Option<Yarns>,
+    /// Vertices and nodes.
+    pub points: Points,
+    /// Blocks of the yarns' unknowns, after those of the vertices.
+    pub unknowns: Unknowns,
+    sliding: Vec<bool>,
     /// Energies.
     pub terms: Vec<Box<dyn Term>>,
     /// Bodies of the world.
@@ -28,8 +39,6 @@ pub struct System {
     pub edges: Vec<[u32; 2]>,
     /// Their rest lengths [m].
     pub rest_lengths: Vec<f64>,
-    /// Mass-proportional damping of each vertex [1/s].
-    pub damping: Vec<f64>,
     options: BuildOptions,
 }
 
@@ -53,25 +62,32 @@ pub struct BuildOptions {
 }
 
 impl System {
-    /// Compiles rest data; bodies come later.
+    /// Compiles a garment of triangles alone; bodies come later.
     pub fn new(cloth: Cloth, options: &BuildOptions) -> Result<Self> {
-        let terms = terms(&cloth, options)?;
+        Self::with_yarns(cloth, None, options)
+    }
+
+    /// Compiles a garment whose yarns are simulated where the cloth has no triangles.
+    pub fn with_yarns(cloth: Cloth, yarns: Option<Yarns>, options: &BuildOptions) -> Result<Self> {
+        let points = Points::new(&cloth, yarns.as_ref());
+        let sliding = vec![false; yarns.as_ref().map_or(0, |y| y.mesh.incidences.len())];
+        let unknowns = unknowns(&cloth, yarns.as_ref(), &sliding)?;
+        let terms = terms(&cloth, &points, yarns.as_ref(), options)?;
         let edges = topology::edges(&cloth.mesh.triangles);
         let rest_lengths = edges
             .iter()
             .map(|e| (cloth.mesh.uv[e[1] as usize] - cloth.mesh.uv[e[0] as usize]).norm())
             .collect();
-        let mut damping = vec![0.0; cloth.mesh.uv.len()];
-        for (d, panel) in damping.iter_mut().zip(&cloth.mesh.vertex_panel) {
-            *d = cloth.fabrics[cloth.panel_fabric[*panel as usize]].damping_mass;
-        }
         Ok(Self {
             cloth,
+            yarns,
+            points,
+            unknowns,
+            sliding,
             terms,
             bodies: BodySet::default(),
             edges,
             rest_lengths,
-            damping,
             options: options.clone(),
         })
     }
@@ -79,10 +95,60 @@ impl System {
     /// Takes changed options; terms that carry them are built anew.
     pub fn set_options(&mut self, options: &BuildOptions) -> Result<()> {
         if *options != self.options {
-            self.terms = terms(&self.cloth, options)?;
+            self.terms = terms(&self.cloth, &self.points, self.yarns.as_ref(), options)?;
             self.options = options.clone();
         }
         Ok(())
+    }
+
+    /// Number of blocks of unknowns: points, then sliding coordinates.
+    pub fn block_count(&self) -> usize {
+        self.points.count() + self.unknowns.slide_blocks()
+    }
+
+    /// Takes which yarns slide where; true if unknowns have come or gone.
+    pub fn set_sliding(&mut self, sliding: &[bool]) -> Result<bool> {
+        if *sliding == *self.sliding {
+            return Ok(false);
+        }
+        self.unknowns = unknowns(&self.cloth, self.yarns.as_ref(), sliding)?;
+        self.sliding.clear();
+        self.sliding.extend_from_slice(sliding);
+        self.terms = terms(
+            &self.cloth,
+            &self.points,
+            self.yarns.as_ref(),
+            &self.options,
+        )?;
+        Ok(true)
+    }
+
+    /// Values of all blocks in a state.
+    pub fn pack(&self, state: &State, x: &mut Vec<Vec3>) {
+        x.clear();
+        x.extend_from_slice(&state.positions);
+        x.resize(self.block_count(), Vec3::zeros());
+        for (u, slot) in state.u.iter().zip(&self.unknowns.slides) {
+            if let Some((block, c)) = slot {
+                x[*block as usize][usize::from(*c)] = *u;
+            }
+        }
+    }
+
+    /// Writes blocks that have moved from `start` to `x` in the time `h` [s] back into a state.
+    pub fn unpack(&self, start: &[Vec3], x: &[Vec3], h: f64, state: &mut State) {
+        for i in 0..self.points.count() {
+            state.positions[i] = x[i];
+            state.velocities[i] = (x[i] - start[i]) / h;
+        }
+        for (i, slot) in self.unknowns.slides.iter().enumerate() {
+            state.u_rates[i] = 0.0;
+            if let Some((block, c)) = slot {
+                let (block, c) = (*block as usize, usize::from(*c));
+                state.u[i] = x[block][c];
+                state.u_rates[i] = (x[block][c] - start[block][c]) / h;
+            }
+        }
     }
 
     /// Bytes of the mesh and of the rest data, terms not counted.
@@ -159,11 +225,25 @@ impl System {
     }
 }
 
-fn terms(cloth: &Cloth, options: &BuildOptions) -> Result<Vec<Box<dyn Term>>> {
+fn unknowns(cloth: &Cloth, yarns: Option<&Yarns>, sliding: &[bool]) -> Result<Unknowns> {
+    let Some(yarns) = yarns else {
+        return Ok(Unknowns::default());
+    };
+    let nodes = yarns.mesh.uv.len();
+    let first = cloth.mesh.uv.len();
+    Unknowns::new(&yarns.mesh, first as u32, (first + nodes) as u32, sliding)
+}
+
+fn terms(
+    cloth: &Cloth,
+    points: &Points,
+    yarns: Option<&Yarns>,
+    options: &BuildOptions,
+) -> Result<Vec<Box<dyn Term>>> {
     let mut terms: Vec<Box<dyn Term>> = vec![
         Box::new(Gravity::new(cloth)),
         Box::new(Membrane::new(cloth, options.softening)),
-        Box::new(BodyContact::new(cloth)),
+        Box::new(BodyContact::new(points)),
         Box::new(EdgeContact::new(cloth)),
     ];
     for bending in Hinge::terms(cloth) {
@@ -192,6 +272,8 @@ fn terms(cloth: &Cloth, options: &BuildOptions) -> Result<Vec<Box<dyn Term>>> {
         let friction = cloth.fabrics.iter().map(|f| f.friction).fold(0.0, f64::max);
         terms.push(Box::new(SelfContact::new(
             cloth,
+            points,
+            yarns,
             options.self_stiffness,
             friction,
         )?));

@@ -9,10 +9,18 @@ use serde::{Deserialize, Serialize};
 pub struct State {
     /// Simulated time [s].
     pub time: f64,
-    /// Vertex positions [m].
+    /// Positions of the vertices, then of the yarns' nodes [m].
     pub positions: Vec<Vec3>,
-    /// Vertex velocities [m/s].
+    /// Their velocities [m/s].
     pub velocities: Vec<Vec3>,
+    /// Material coordinate of every incidence of a yarn [m].
+    pub u: Vec<f64>,
+    /// Its rate [m/s].
+    pub u_rates: Vec<f64>,
+    /// Whether the yarn slides there now, so that the coordinate is an unknown.
+    pub sliding: Vec<bool>,
+    /// One for each strand of the yarns' stacks.
+    pub strands: Vec<StrandState>,
     /// Pinned vertices, sorted by vertex.
     pub pins: Vec<Pin>,
     /// One for each body of the world.
@@ -31,7 +39,18 @@ pub struct State {
     pub pressure: f64,
 }
 
-/// A vertex held at a place.
+/// Friction of one strand in the stack of a node.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct StrandState {
+    /// Anchor of its sliding [m].
+    pub anchor: f64,
+    /// Anchor of its sliding past the next strand, if that lies beside it [m].
+    pub beside: f64,
+    /// Force between it and the next strand in the last accepted step [N].
+    pub contact: f64,
+}
+
+/// A point held at a place: a vertex or, counted on, a node of the yarns.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pin {
     /// The vertex.

@@ -73,6 +73,31 @@ pub struct SeamLink {
     pub length: f64,
 }
 
+impl GarmentMesh {
+    /// Leaves out the triangles of some panels, and the ties of seams that lead there; vertices
+    /// stay, without triangles.
+    pub fn without_triangles_of(&self, left_out: &[bool]) -> Self {
+        let kept = |panel: u32| !left_out[panel as usize];
+        let mut mesh = self.clone();
+        mesh.triangles.clear();
+        mesh.triangle_panel.clear();
+        for (tri, &panel) in self.triangles.iter().zip(&self.triangle_panel) {
+            if kept(panel) {
+                mesh.triangles.push(*tri);
+                mesh.triangle_panel.push(panel);
+            }
+        }
+        for seam in &mut mesh.seams {
+            seam.links.retain(|l| {
+                [l.vertex, l.edge[0], l.edge[1]]
+                    .iter()
+                    .all(|&v| kept(self.vertex_panel[v as usize]))
+            });
+        }
+        mesh
+    }
+}
+
 /// Where each vertex of a fine mesh lies in a coarse mesh of the same garment.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Transfer {

@@ -45,6 +45,22 @@ pub struct YarnMesh {
     pub ties: Vec<Tie>,
 }
 
+/// Yarns and what they are made of.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Yarns {
+    /// How they lie.
+    pub mesh: YarnMesh,
+    /// One for each fabric of the garment.
+    pub materials: Vec<YarnMaterial>,
+}
+
+impl Yarns {
+    /// What a yarn is made of.
+    pub fn material(&self, yarn: usize) -> &YarnMaterial {
+        &self.materials[self.mesh.yarn_fabric[yarn] as usize]
+    }
+}
+
 /// One passage of a yarn through a node.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Incidence {

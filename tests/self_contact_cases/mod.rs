@@ -79,6 +79,8 @@ pub(crate) fn squares(panels: usize, cells: usize, spacing: f64) -> Cloth {
     let mut cloth = Cloth {
         vertex_areas: vec![0.0; mesh.uv.len()],
         masses: vec![0.0; mesh.uv.len()],
+        panel_fabric: vec![0; panels],
+        fabrics: vec![toile::pattern::Fabric::default()],
         mesh,
         ..Cloth::default()
     };
@@ -116,6 +118,10 @@ pub(crate) fn state(positions: Vec<Vec3>) -> State {
         time: 0.0,
         velocities: vec![Vec3::zeros(); positions.len()],
         positions,
+        u: Vec::new(),
+        u_rates: Vec::new(),
+        sliding: Vec::new(),
+        strands: Vec::new(),
         pins: Vec::new(),
         bodies: Vec::new(),
         body_anchors: Vec::new(),

@@ -1,7 +1,7 @@
 //! Cloth against bodies: penalty on the signed distance, Coulomb friction by moving anchors.
 //!
-//! With `d(x)` the signed distance, `t` the thickness, `A` the vertex's area and `c` the contact
-//! stiffness [Pa/m], `k = c A` [N/m]:
+//! With `d(x)` the signed distance, `t` the thickness (or the yarn's radius, if that is larger), `A`
+//! the point's area and `c` the contact stiffness [Pa/m], `k = c A` [N/m]:
 //!
 //! ```text
 //! V = k/2 (t - d)^2   where d < t
@@ -11,10 +11,10 @@
 //! tangent plane at the start of the step.
 
 use super::super::state::{BodyAnchor, State};
-use super::super::term::{Configuration, HessianKind, Stencils, Term};
+use super::super::term::{Configuration, ContactSettings, HessianKind, Stencils, Term};
 use super::friction::{Friction, kept};
-use crate::cloth::Cloth;
 use crate::math::{Mat3, Vec3};
+use crate::system::points::Points;
 
 /// Friction of one vertex on one body.
 #[derive(Clone, Copy, Debug)]
@@ -30,11 +30,12 @@ impl Rub {
     }
 }
 
-/// Contact of every vertex with every body.
+/// Contact of every vertex and node with every body.
 #[derive(Debug, Default)]
 pub struct BodyContact {
     vertices: Vec<u32>,
     areas: Vec<f64>,
+    radii: Vec<f64>,
     /// Per vertex and body: how far the vertex may move before it can touch.
     clearance: Vec<f64>,
     body_count: usize,
@@ -44,12 +45,13 @@ pub struct BodyContact {
 }
 
 impl BodyContact {
-    /// Contact for the vertices of a cloth.
-    pub fn new(cloth: &Cloth) -> Self {
-        let n = cloth.mesh.uv.len();
+    /// Contact for points; one that does not move by itself touches nothing.
+    pub fn new(points: &Points) -> Self {
+        let n = points.count();
         Self {
             vertices: (0..n as u32).collect(),
-            areas: cloth.vertex_areas.clone(),
+            areas: points.areas.clone(),
+            radii: points.radii.clone(),
             clearance: Vec::new(),
             body_count: 0,
             rub_starts: vec![0; n + 1],
@@ -64,6 +66,11 @@ impl BodyContact {
     ) -> impl Iterator<Item = usize> + 'a {
         let moved = (at.x[e] - at.x0[e]).norm();
         (0..self.body_count).filter(move |b| moved >= self.clearance[e * self.body_count + b])
+    }
+
+    /// Distance from a body below which the point presses on it [m].
+    fn thickness(&self, e: usize, contact: &ContactSettings) -> f64 {
+        contact.thickness.max(self.radii[e])
     }
 
     fn rubs(&self, e: usize) -> &[Rub] {
@@ -93,7 +100,7 @@ impl Term for BodyContact {
         let mut sum = 0.0;
         for b in self.touching(e, at) {
             let contact = bodies.contact(b);
-            let depth = contact.thickness - bodies.value(b, x);
+            let depth = self.thickness(e, contact) - bodies.value(b, x);
             if depth > 0.0 {
                 sum += 0.5 * contact.stiffness * self.areas[e] * depth * depth;
             }
@@ -111,7 +118,7 @@ impl Term for BodyContact {
         for b in self.touching(e, at) {
             let contact = bodies.contact(b);
             let d = bodies.distance(b, x);
-            let depth = contact.thickness - d.value;
+            let depth = self.thickness(e, contact) - d.value;
             if depth > 0.0 {
                 g -= d.gradient * (contact.stiffness * self.areas[e] * depth);
             }
@@ -129,7 +136,7 @@ impl Term for BodyContact {
         for b in self.touching(e, at) {
             let contact = bodies.contact(b);
             let d = bodies.distance(b, x);
-            let depth = contact.thickness - d.value;
+            let depth = self.thickness(e, contact) - d.value;
             if depth > 0.0 {
                 let k = contact.stiffness * self.areas[e];
                 h += d.gradient * d.gradient.transpose() * k;
@@ -149,10 +156,13 @@ impl Term for BodyContact {
         let bodies = at.world.bodies;
         self.body_count = bodies.count();
         self.clearance.clear();
-        for x in at.x0 {
+        for (e, x) in at.x0[..self.vertices.len()].iter().enumerate() {
             for b in 0..self.body_count {
-                self.clearance
-                    .push(bodies.value(b, x) - bodies.contact(b).thickness);
+                self.clearance.push(if self.areas[e] > 0.0 {
+                    bodies.value(b, x) - self.thickness(e, bodies.contact(b))
+                } else {
+                    f64::INFINITY
+                });
             }
         }
         self.rubs.clear();
@@ -198,7 +208,7 @@ impl Term for BodyContact {
             let mut f = Vec3::zeros();
             if self.touching(e, at).any(|b| b == body) {
                 let d = at.world.bodies.distance(body, x);
-                f -= d.gradient * (k * (contact.thickness - d.value).max(0.0));
+                f -= d.gradient * (k * (self.thickness(e, contact) - d.value).max(0.0));
             }
             for rub in self.rubs(e).iter().filter(|r| r.body as usize == body) {
                 f += rub.friction.force(&rub.slip(x));
@@ -216,7 +226,7 @@ impl Term for BodyContact {
             for b in self.touching(e, at) {
                 let contact = bodies.contact(b);
                 let d = bodies.distance(b, &x);
-                let depth = contact.thickness - d.value;
+                let depth = self.thickness(e, contact) - d.value;
                 if depth <= 0.0 {
                     continue;
                 }

@@ -25,8 +25,10 @@ use super::travel;
 use crate::cloth::Cloth;
 use crate::error::{Error, Result};
 use crate::math::{Mat3, Vec3};
+use crate::system::points::Points;
 use crate::system::state::{PairAnchor, State};
 use crate::system::term::{Configuration, HessianKind, Stencils, Term};
+use crate::yarn::Yarns;
 
 /// Reserve of the spheres, see [`Spheres`].
 pub const RESERVE: f64 = 0.15;
@@ -69,7 +71,13 @@ pub struct SelfContact {
 
 impl SelfContact {
     /// `stiffness` is pressure per depth [Pa/m], `friction` Coulomb's.
-    pub fn new(cloth: &Cloth, stiffness: f64, friction: f64) -> Result<Self> {
+    pub fn new(
+        cloth: &Cloth,
+        points: &Points,
+        yarns: Option<&Yarns>,
+        stiffness: f64,
+        friction: f64,
+    ) -> Result<Self> {
         for (what, value) in [("stiffness", stiffness), ("friction", friction)] {
             if !(value.is_finite() && value >= 0.0) {
                 return Err(Error::argument(format!(
@@ -78,9 +86,9 @@ impl SelfContact {
             }
         }
         Ok(Self {
-            spheres: Spheres::new(cloth, RESERVE)?,
+            spheres: Spheres::new(cloth, points, yarns, RESERVE)?,
             triangles: cloth.mesh.triangles.clone(),
-            areas: cloth.vertex_areas.clone(),
+            areas: points.areas.clone(),
             stiffness,
             friction,
             stencils: Vec::new(),
@@ -100,7 +108,8 @@ impl SelfContact {
     /// Largest part (0 to 1) of the way from `x0` to `x` on which no cloth can have passed through
     /// cloth.
     pub fn max_travel(&self, x0: &[Vec3], x: &[Vec3]) -> f64 {
-        travel::max_travel(&self.spheres, x0, x)
+        let count = self.spheres.radii.len();
+        travel::max_travel(&self.spheres, &x0[..count], &x[..count])
     }
 
     /// Bytes held.

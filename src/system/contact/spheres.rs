@@ -28,11 +28,18 @@
 //! they cannot be pushed apart without stretching it. The way along the cloth is the shortest one
 //! over edges and seam links; inside a panel the straight line replaces it where the way over
 //! edges is at most 1.5 times longer (a zigzag through the mesh, not a way around a hole).
+//!
+//! # Yarns
+//!
+//! A node's sphere has the radius of the yarn. Segments are ways like edges; nodes of one panel are
+//! neighbours if the straight line between them is short, since yarns of one layer touch.
 
 use crate::cloth::Cloth;
 use crate::error::{Error, Result};
-use crate::math::Vec3;
 use crate::math::topology::edges;
+use crate::math::{Vec2, Vec3};
+use crate::system::points::Points;
+use crate::yarn::Yarns;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
@@ -55,7 +62,12 @@ pub struct Spheres {
 
 impl Spheres {
     /// Spheres of a garment. `reserve` is relative and must not be negative.
-    pub fn new(cloth: &Cloth, reserve: f64) -> Result<Self> {
+    pub fn new(
+        cloth: &Cloth,
+        points: &Points,
+        yarns: Option<&Yarns>,
+        reserve: f64,
+    ) -> Result<Self> {
         if !(reserve.is_finite() && reserve >= 0.0) {
             return Err(Error::argument(format!(
                 "reserve of the contact spheres {reserve} must not be negative"
@@ -86,10 +98,10 @@ impl Spheres {
             let cover = covering_radius(length(b, c), length(c, a), length(a, b));
             kappa = kappa.max(cover / (around + smallest));
         }
-        let radii: Vec<f64> = longest
-            .iter()
-            .map(|l| kappa * (1.0 + reserve) * l)
-            .collect();
+        let mut radii = points.radii.clone();
+        for (r, l) in radii.iter_mut().zip(&longest) {
+            *r = kappa * (1.0 + reserve) * l;
+        }
         let mut spheres = Self {
             largest: radii.iter().copied().fold(0.0, f64::max),
             radii,
@@ -97,7 +109,7 @@ impl Spheres {
             starts: vec![0],
             partners: Vec::new(),
         };
-        spheres.exclude(cloth, &edges);
+        spheres.exclude(&Flat::new(cloth, yarns), &ways(cloth, &edges, yarns));
         Ok(spheres)
     }
 
@@ -131,21 +143,11 @@ impl Spheres {
         8 * self.radii.len() + 4 * (self.starts.len() + self.partners.len())
     }
 
-    /// Shortest ways from every vertex, as far as a pair can count as neighbours.
-    fn exclude(&mut self, cloth: &Cloth, edges: &[[u32; 2]]) {
+    /// Shortest ways from every point, as far as a pair can count as neighbours.
+    fn exclude(&mut self, flat: &Flat<'_>, ways: &[(u32, u32, f64)]) {
         let n = self.radii.len();
-        let uv = &cloth.mesh.uv;
-        let length = |a: u32, b: u32| (uv[a as usize] - uv[b as usize]).norm();
-        let mut ways: Vec<(u32, u32, f64)> =
-            edges.iter().map(|&[a, b]| (a, b, length(a, b))).collect();
-        for link in cloth.mesh.seams.iter().flat_map(|s| &s.links) {
-            let [e0, e1] = link.edge;
-            let whole = length(e0, e1);
-            ways.push((link.vertex, e0, link.t.abs() * whole));
-            ways.push((link.vertex, e1, (1.0 - link.t).abs() * whole));
-        }
         let mut starts = vec![0_usize; n + 1];
-        for &(a, b, _) in &ways {
+        for &(a, b, _) in ways {
             starts[a as usize + 1] += 1;
             starts[b as usize + 1] += 1;
         }
@@ -154,7 +156,7 @@ impl Spheres {
         }
         let mut next = starts.clone();
         let mut graph = vec![(0_u32, 0.0); starts[n]];
-        for &(a, b, l) in &ways {
+        for &(a, b, l) in ways {
             for (a, b) in [(a, b), (b, a)] {
                 graph[next[a as usize]] = (b, l);
                 next[a as usize] += 1;
@@ -189,9 +191,9 @@ impl Spheres {
             for b in touched.drain(..) {
                 let way = std::mem::replace(&mut distance[b as usize], f64::INFINITY);
                 let limit = fold * self.rest_distance(a, b);
-                let same_panel =
-                    cloth.mesh.vertex_panel[a as usize] == cloth.mesh.vertex_panel[b as usize];
-                let straight = same_panel && way <= DETOUR * length(a, b) && length(a, b) <= limit;
+                let straight = flat
+                    .line(a, b)
+                    .is_some_and(|(l, yarns)| l <= limit && (yarns || way <= DETOUR * l));
                 if b > a && (way <= limit || straight) {
                     self.partners.push(b);
                 }
@@ -199,6 +201,69 @@ impl Spheres {
             self.starts.push(self.partners.len() as u32);
         }
     }
+}
+
+/// Where the points lie on their panels.
+struct Flat<'a> {
+    cloth: &'a Cloth,
+    yarns: Option<&'a Yarns>,
+}
+
+impl<'a> Flat<'a> {
+    fn new(cloth: &'a Cloth, yarns: Option<&'a Yarns>) -> Self {
+        Self { cloth, yarns }
+    }
+
+    /// Panel, place, and whether it is a node of a yarn.
+    fn place(&self, point: u32) -> (u32, Vec2, bool) {
+        let (mesh, p) = (&self.cloth.mesh, point as usize);
+        match self.yarns {
+            Some(yarns) if p >= mesh.uv.len() => {
+                let node = p - mesh.uv.len();
+                (yarns.mesh.node_panel[node], yarns.mesh.uv[node], true)
+            }
+            _ => (mesh.vertex_panel[p], mesh.uv[p], false),
+        }
+    }
+
+    /// Length of the straight line between points of one panel, and whether both are nodes.
+    fn line(&self, a: u32, b: u32) -> Option<(f64, bool)> {
+        let (a, b) = (self.place(a), self.place(b));
+        (a.0 == b.0).then(|| ((b.1 - a.1).norm(), a.2 && b.2))
+    }
+}
+
+/// Ways along the sewn cloth: edges, links of seams, segments of yarns and their ties.
+fn ways(cloth: &Cloth, edges: &[[u32; 2]], yarns: Option<&Yarns>) -> Vec<(u32, u32, f64)> {
+    let uv = &cloth.mesh.uv;
+    let length = |a: u32, b: u32| (uv[a as usize] - uv[b as usize]).norm();
+    let mut ways: Vec<(u32, u32, f64)> = edges.iter().map(|&[a, b]| (a, b, length(a, b))).collect();
+    for link in cloth.mesh.seams.iter().flat_map(|s| &s.links) {
+        let [e0, e1] = link.edge;
+        let whole = length(e0, e1);
+        ways.push((link.vertex, e0, link.t.abs() * whole));
+        ways.push((link.vertex, e1, (1.0 - link.t).abs() * whole));
+    }
+    if let Some(Yarns { mesh, .. }) = yarns {
+        let first = uv.len() as u32;
+        for y in 0..mesh.yarn_count() {
+            for pair in mesh.yarn(y).windows(2) {
+                let du = pair[1].u - pair[0].u;
+                ways.push((first + pair[0].node, first + pair[1].node, du));
+            }
+        }
+        for tie in &mesh.ties {
+            let [a, b] = tie.segment.map(|n| mesh.uv[n as usize]);
+            let whole = (b - a).norm();
+            ways.push((first + tie.node, first + tie.segment[0], tie.t * whole));
+            ways.push((
+                first + tie.node,
+                first + tie.segment[1],
+                (1.0 - tie.t) * whole,
+            ));
+        }
+    }
+    ways
 }
 
 /// A length that a heap can order.
