@@ -74,6 +74,8 @@ mod real_garments;
 mod reference_bending;
 #[path = "reference_membrane.rs"]
 mod reference_membrane;
+#[path = "rest.rs"]
+mod rest;
 #[path = "scene_motion.rs"]
 mod scene_motion;
 #[path = "scene_motion_errors.rs"]
