@@ -5,6 +5,7 @@
 #   make bench   tables of speed and error
 #   make fuzz    every fuzz target, FUZZ_SECONDS (20) each
 #   make soak    the long random runs, fuzz targets included
+#   make wheel   the Python package with the library as one file, in out/wheels
 #   make header  write include/toile.h and tests/golden/abi.txt anew
 #   make install PREFIX=/usr/local
 
@@ -16,7 +17,7 @@ LIB    := target/release/libtoile.so
 PYTHON := target/venv/bin/python
 export TOILE_PYTHON ?= $(abspath $(PYTHON))
 
-.PHONY: all demo test quick bench fuzz soak header install tools lint clean
+.PHONY: all demo test quick bench fuzz soak header wheel install tools lint clean
 
 all:
 	$(CARGO) build --release
@@ -54,6 +55,9 @@ soak: all
 
 header:
 	TOILE_BLESS=1 $(CARGO) test --release --test suite -- header:: abi::
+
+wheel:
+	$(or $(wildcard $(PYTHON)),python3) -m pip wheel ./python --no-deps --wheel-dir $(OUT)/wheels
 
 install: all
 	bash scripts/install.sh "$(PREFIX)"

@@ -15,9 +15,11 @@ use toile::math::Vec3;
 use toile::math::parallel::Workers;
 use toile::solve::linear::LinearSolver;
 use toile::solve::linear::direct::Direct;
+use toile::solve::linear::factored::SingleFactor;
 use toile::solve::linear::ic0::{IncompleteCholesky, Order, Storage};
 use toile::solve::linear::jacobi::BlockJacobi;
 use toile::solve::linear::pcg::ConjugateGradients;
+use toile::solve::linear::stiff_part::StiffPart;
 
 fn main() {
     let sizes: Vec<usize> = std::env::args().filter_map(|a| a.parse().ok()).collect();
@@ -48,6 +50,12 @@ fn main() {
             let seams = || Order::Priorities(case.priorities.clone());
             let solvers: Vec<(&str, Box<dyn LinearSolver>)> = vec![
                 ("cholesky", Box::new(Direct::new(&Workers::default()))),
+                (
+                    "cg cholesky",
+                    Box::new(ConjugateGradients::new(Box::new(StiffPart::new(Box::new(
+                        SingleFactor::new(&Workers::default()),
+                    ))))),
+                ),
                 (
                     "cg jacobi",
                     Box::new(ConjugateGradients::new(Box::new(BlockJacobi::new()))),

@@ -102,7 +102,7 @@ int main(int argc, char **argv) {
     fprintf(stderr, "\n");
 
     static const char *const outcomes[] = {"converged", "substepped", "iteration limit",
-                                           "cancelled"};
+                                           "cancelled", "stalled", "falling"};
     toile_system_info info;
     CALL(toile_system_info_init(&info, sizeof info));
     CALL(toile_sim_info(sim, &info));
@@ -110,7 +110,7 @@ int main(int argc, char **argv) {
     printf("%-24s %12u\n", "seams", (unsigned)seams);
     printf("%-24s %12llu\n", "vertices", (unsigned long long)info.vertices);
     printf("%-24s %12llu\n", "triangles", (unsigned long long)info.triangles);
-    printf("%-24s %12s\n", "outcome", report.outcome < 4 ? outcomes[report.outcome] : "?");
+    printf("%-24s %12s\n", "outcome", report.outcome < 6 ? outcomes[report.outcome] : "?");
     printf("%-24s %12llu\n", "substeps", (unsigned long long)report.substeps);
     printf("%-24s %12llu\n", "Newton iterations", (unsigned long long)report.newton_iterations);
     printf("%-24s %12.3e\n", "residual [N]", report.residual);

@@ -3,9 +3,9 @@
  *
  * This file is generated from the library's sources; do not edit it.
  *
- * Handles. toile_garment, toile_body and toile_sim are opaque and are only handed back to the
- *   library. A handle that is NULL, freed, or of another kind is TOILE_E_HANDLE, never a crash.
- *   The caller frees handles and nothing else.
+ * Handles. toile_garment, toile_body, toile_sim and toile_array are opaque and are only handed
+ *   back to the library. A handle that is NULL, freed, or of another kind is TOILE_E_HANDLE, never
+ *   a crash. The caller frees handles and nothing else.
  * Results. Every call that can fail returns a toile_status, 0 or a negative error, and gives its
  *   results by out-parameters. toile_last_error() says what went wrong, where, the limit and the
  *   value. After any error but TOILE_E_PANIC the object is exactly as it was before the call.
@@ -16,8 +16,9 @@
  *   `*needed` gets the number of elements; then the caller passes an array of at least that
  *   `capacity`. TOILE_E_SIZE: the array is too small, nothing was written to it, and `*needed`
  *   says what it takes. Views point into the library and are valid until the next call on that
- *   handle whose handle is not const. Pointers must be NULL or valid for the stated count, arrays
- *   aligned as their type asks. Text is UTF-8.
+ *   handle whose handle is not const; what a toile_array holds is there, and the same, until
+ *   toile_array_free. Pointers must be NULL or valid for the stated count, arrays aligned as their
+ *   type asks. Text is UTF-8.
  * Threads. Calls whose handle is const may run beside each other; a call whose handle is not const
  *   needs the handle for itself; different handles are independent. Breaking this is TOILE_E_BUSY.
  * Units. SI throughout: m, kg, s, N, Pa, rad. Arrays are row-major, three numbers per point,
@@ -185,6 +186,23 @@
  * The host asked to stop; the state is admissible.
  */
 #define TOILE_OUTCOME_CANCELLED 3
+
+/**
+ * A drape ended where no step, however short, leads lower; the state is admissible, the residual is
+ * in the report, the reason in the log.
+ */
+#define TOILE_OUTCOME_STALLED 4
+
+/**
+ * Nothing holds a part of the garment and nothing lies on its way: a drape of it would never end.
+ * The state is that at which this was seen; the log names the part.
+ */
+#define TOILE_OUTCOME_FALLING 5
+
+/**
+ * An array that stays as it was.
+ */
+typedef struct toile_array toile_array;
 
 /**
  * A body that cloth meets: a signed distance field, negative inside. Never changes.
@@ -379,6 +397,36 @@ typedef struct toile_sdf_grid_desc {
 typedef void (*toile_log_fn)(void *user, uint32_t level, const char *message);
 
 /**
+ * How far a long call has come.
+ */
+typedef struct toile_progress {
+    /**
+     * sizeof(toile_progress) of the library; a newer library may have appended fields.
+     */
+    size_t struct_size;
+    /**
+     * Estimate of the part done, 0 to 1, never decreasing.
+     */
+    double fraction;
+    /**
+     * Name of the stage, UTF-8, valid during the callback: "sew", "settle", "unfold", "rest" of a
+     * drape, "step" of a step.
+     */
+    const char *stage;
+    /**
+     * Largest force on a free vertex now [N].
+     */
+    double residual;
+} toile_progress;
+
+/**
+ * Called on the calling thread while a long call works. Returns 0 to go on; anything else stops
+ * the call as soon as there is an admissible state. The simulation at work is busy for calls from
+ * in here. Must not throw or jump out.
+ */
+typedef int32_t (*toile_progress_fn)(void *user, const struct toile_progress *progress);
+
+/**
  * The world of a simulation.
  */
 typedef struct toile_sim_desc {
@@ -418,6 +466,15 @@ typedef struct toile_sim_desc {
      * Handed to the log callback.
      */
     void *log_user;
+    /**
+     * Told before every substep how far a step has come (its stage is "step"), and asked whether to
+     * go on; NULL for none. A step that is stopped leaves the simulation as it was before it.
+     */
+    toile_progress_fn progress;
+    /**
+     * Handed to the progress callback.
+     */
+    void *progress_user;
 } toile_sim_desc;
 
 /**
@@ -441,35 +498,6 @@ typedef struct toile_contact_desc {
      */
     double stiffness;
 } toile_contact_desc;
-
-/**
- * How far a long call has come.
- */
-typedef struct toile_progress {
-    /**
-     * sizeof(toile_progress) of the library; a newer library may have appended fields.
-     */
-    size_t struct_size;
-    /**
-     * Estimate of the part done, 0 to 1, never decreasing.
-     */
-    double fraction;
-    /**
-     * Name of the stage, UTF-8, valid during the callback: "sew", "settle", "unfold", "rest".
-     */
-    const char *stage;
-    /**
-     * Largest force on a free vertex now [N].
-     */
-    double residual;
-} toile_progress;
-
-/**
- * Called on the calling thread while a long call works. Returns 0 to go on; anything else stops
- * the call as soon as there is an admissible state. The simulation at work is busy for calls from
- * in here. Must not throw or jump out.
- */
-typedef int32_t (*toile_progress_fn)(void *user, const struct toile_progress *progress);
 
 /**
  * How to drape.
@@ -1010,8 +1038,8 @@ toile_status toile_sim_pin(struct toile_sim *sim,
 toile_status toile_sim_unpin(struct toile_sim *sim, const uint32_t *vertices, size_t count);
 
 /**
- * Holds nodes of yarns, as toile_sim_pin holds vertices. TOILE_E_ARGUMENT names a node that does
- * not exist.
+ * Holds nodes of yarns, as toile_sim_pin holds vertices; yarns do not slide where they are held.
+ * TOILE_E_ARGUMENT names a node that does not exist.
  */
 toile_status toile_sim_pin_yarn_nodes(struct toile_sim *sim,
                                       const uint32_t *nodes,
@@ -1019,9 +1047,15 @@ toile_status toile_sim_pin_yarn_nodes(struct toile_sim *sim,
                                       const double *targets);
 
 /**
+ * Lets nodes of yarns go. TOILE_E_ARGUMENT names one that is not held.
+ */
+toile_status toile_sim_unpin_yarn_nodes(struct toile_sim *sim, const uint32_t *nodes, size_t count);
+
+/**
  * Moves the region in which every yarn is simulated, with the state carried over: a polygon of a
  * panel in flat coordinates [m], shape [count, 2], and `rings` hybrid rings around it. A count of 0
- * takes the region away. TOILE_E_UNSUPPORTED: this version simulates triangles only.
+ * takes the region away. TOILE_E_UNSUPPORTED: this version takes regions only when the simulation is
+ * made; a count of 0 on a panel without yarns is fine.
  */
 toile_status toile_sim_set_blend_region(struct toile_sim *sim,
                                         uint32_t panel,
@@ -1083,15 +1117,17 @@ void toile_sim_free(struct toile_sim *sim);
 
 /**
  * Advances by exactly `dt` [s], in smaller steps inside where needed, or fails and leaves the
- * simulation as it was. `report` may be NULL. TOILE_E_NO_ADMISSIBLE_STATE: pins or bodies ask for
- * what cannot be; a shorter step may pass.
+ * simulation as it was. `report` may be NULL. Stopped by the simulation's progress callback it is
+ * TOILE_OK, has advanced by 0 and leaves everything as it was. TOILE_E_NO_ADMISSIBLE_STATE: pins or
+ * bodies ask for what cannot be; a shorter step may pass.
  */
 toile_status toile_sim_step(struct toile_sim *sim, double dt, struct toile_step_report *report);
 
 /**
  * Sews the garment and lets it come to rest. `desc` NULL takes the defaults; `report` may be NULL.
- * Stopped by the iteration limit or by the progress callback it is TOILE_OK too, with the outcome
- * in the report, and may be called again to go on.
+ * Stopped by the iteration limit, by the progress callback, in a dead end, or because nothing holds
+ * the garment, it is TOILE_OK too, with the outcome in the report, and may be called again to go
+ * on.
  */
 toile_status toile_sim_drape(struct toile_sim *sim,
                              const struct toile_drape_desc *desc,
@@ -1203,7 +1239,7 @@ toile_status toile_sim_velocities_view(const struct toile_sim *sim, struct toile
 
 /**
  * World positions of the yarns' nodes [m], shape [node_count, 3]; sizes as in toile_sim_positions.
- * This version has no yarns: always empty.
+ * Empty in a garment of triangles alone.
  */
 toile_status toile_sim_yarn_nodes(const struct toile_sim *sim,
                                   double *out,
@@ -1226,6 +1262,43 @@ toile_status toile_sim_yarn_indices(const struct toile_sim *sim,
                                     uint32_t *out,
                                     size_t capacity,
                                     size_t *needed);
+
+/**
+ * Arc length at rest of each yarn at its nodes [m], in the order of toile_sim_yarn_indices; it
+ * changes where yarns slide. Sizes as in toile_sim_positions.
+ */
+toile_status toile_sim_yarn_coordinates(const struct toile_sim *sim,
+                                        double *out,
+                                        size_t capacity,
+                                        size_t *needed);
+
+/**
+ * Tension of each yarn between a node and the next along it [N], negative where it is compressed,
+ * in the order of toile_sim_yarn_indices with 0 at the last node of a yarn. Sizes as in
+ * toile_sim_positions.
+ */
+toile_status toile_sim_yarn_tensions(const struct toile_sim *sim,
+                                     double *out,
+                                     size_t capacity,
+                                     size_t *needed);
+
+/**
+ * Largest normal force between two yarns at each node [N], shape [node_count], of the last step or
+ * drape. Sizes as in toile_sim_positions.
+ */
+toile_status toile_sim_yarn_compressions(const struct toile_sim *sim,
+                                         double *out,
+                                         size_t capacity,
+                                         size_t *needed);
+
+/**
+ * How far each yarn has slid through its nodes since it was laid [m], in the order of
+ * toile_sim_yarn_indices. Sizes as in toile_sim_positions.
+ */
+toile_status toile_sim_yarn_slips(const struct toile_sim *sim,
+                                  double *out,
+                                  size_t capacity,
+                                  size_t *needed);
 
 /**
  * Vertex of a panel nearest to a point of it, in flat coordinates [m].
@@ -1281,6 +1354,28 @@ toile_status toile_sim_backend(const struct toile_sim *sim,
                                char *out,
                                size_t capacity,
                                size_t *needed);
+
+/**
+ * Positions of the vertices [m] as they are now, shape [vertex_count, 3], kept as they are until
+ * toile_array_free, whatever happens to the simulation. No copy is made now; the next call that
+ * changes the simulation makes one if the array is still there.
+ */
+toile_status toile_sim_positions_array(const struct toile_sim *sim, struct toile_array **out);
+
+/**
+ * Velocities of the vertices [m/s], shape [vertex_count, 3], kept like toile_sim_positions_array.
+ */
+toile_status toile_sim_velocities_array(const struct toile_sim *sim, struct toile_array **out);
+
+/**
+ * Where the numbers of an array lie. They are there, and the same, until toile_array_free.
+ */
+toile_status toile_array_view(const struct toile_array *array, struct toile_view_f64 *out);
+
+/**
+ * Frees an array; NULL is allowed.
+ */
+void toile_array_free(struct toile_array *array);
 
 #ifdef __cplusplus
 }  // extern "C"

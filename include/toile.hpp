@@ -192,6 +192,21 @@ private:
     detail::handle<toile_body, toile_body_free> handle_;
 };
 
+/// Numbers that stay where and as they are while this lives.
+class array {
+public:
+    explicit array(toile_array *handle) : handle_(handle) {}
+    toile_view_f64 view() const {
+        auto view = detail::filled<toile_view_f64>(toile_view_f64_init);
+        check(toile_array_view(handle_.get(), &view));
+        return view;
+    }
+    toile_array *get() const noexcept { return handle_.get(); }
+
+private:
+    detail::handle<toile_array, toile_array_free> handle_;
+};
+
 /// A garment in a world.
 class sim {
 public:
@@ -307,6 +322,17 @@ public:
             [this](std::uint32_t *out, std::size_t n, std::size_t *needed) {
                 return toile_sim_triangles(handle_.get(), out, n, needed);
             });
+    }
+    /// Positions as they are now, in the library's own memory, for as long as the array is kept.
+    array positions_array() const {
+        toile_array *made = nullptr;
+        check(toile_sim_positions_array(handle_.get(), &made));
+        return array(made);
+    }
+    array velocities_array() const {
+        toile_array *made = nullptr;
+        check(toile_sim_velocities_array(handle_.get(), &made));
+        return array(made);
     }
     /// Valid until the next call that is not const.
     toile_view_f64 positions_view() const {

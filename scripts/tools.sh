@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs what the tests use beside Rust and a C/C++ compiler: clang, CMake, pkg-config and valgrind
-# as Debian packages where this user may install them, a Python environment in target/venv and the
-# wheels that the package's installation needs in target/wheels.
+# as Debian packages where this user may install them, a Python environment in target/venv, the
+# wheels that the package's installation needs in target/wheels, and environments of other Pythons.
 # Prints what is missing and goes on; under CI=true a missing tool is an error.
 set -u
 cd "$(dirname "$0")/.."
@@ -37,6 +37,7 @@ if [ -x target/venv/bin/python ] && ! ls target/wheels/numpy-* target/wheels/set
   echo "tools: fetching wheels into target/wheels"
   target/venv/bin/pip download --quiet --disable-pip-version-check --dest target/wheels numpy 'setuptools>=68' wheel
 fi
+bash scripts/pythons.sh
 status=0
 for tool in clang cmake pkg-config valgrind target/venv/bin/python; do
   if ! command -v "$tool" >/dev/null 2>&1; then

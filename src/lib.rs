@@ -3,6 +3,7 @@
 //! Read `ARCHITECTURE.md` for the shape of the house. Modules import only from modules that stand
 //! before them in this list.
 
+pub mod blend;
 pub mod body;
 pub mod capi;
 pub mod cloth;

@@ -6,6 +6,7 @@
 mod read;
 mod run;
 mod world;
+mod yarns;
 
 use crate::body::Body;
 use crate::cloth::Cloth;
@@ -16,12 +17,13 @@ use crate::solve::engine::Engine;
 pub use crate::solve::report::{Energies, Outcome, StepReport};
 pub use crate::solve::settings::Settings;
 use crate::system::build::{BuildOptions, System};
-use crate::system::snapshot;
+use crate::system::snapshot::{self, Origin};
 use crate::system::state::State;
 pub use crate::system::term::ContactSettings;
 use crate::tri::GarmentMesh;
 pub use read::SystemInfo;
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use yarns::YarnPart;
 
 /// What a simulation is created with besides the garment.
 #[derive(Clone, Debug, Default)]
@@ -50,7 +52,7 @@ pub struct DrapeOptions {
 pub struct Progress {
     /// Estimate of the part done, 0 to 1, never decreasing.
     pub fraction: f64,
-    /// Stage name: "sew", "settle", "unfold", "rest".
+    /// Stage name: "sew", "settle", "unfold", "rest" of a drape, "step" of a step.
     pub stage: &'static str,
     /// Present residual [N].
     pub residual: f64,
@@ -65,19 +67,15 @@ pub struct Sim {
     engine: Mutex<Engine>,
     mesh: GarmentMesh,
     masses: Vec<f64>,
+    yarns: Option<YarnPart>,
     epoch: u64,
-    fingerprint: u64,
+    origin: Origin,
 }
 
 impl Sim {
     /// Triangulates and compiles the garment; its vertices stand where the panels are placed.
     pub fn new(garment: &Garment, options: &SimOptions) -> Result<Self> {
-        garment.check()?;
-        if !garment.blend_regions.is_empty() {
-            return Err(Error::unsupported(
-                "the garment has a blend region, and this version simulates triangles only",
-            ));
-        }
+        garment.check_within(options.settings.max_vertices as usize)?;
         let mesh = crate::tri::triangulate(garment, 1.0, options.settings.max_vertices as usize)?;
         Self::from_mesh(garment, mesh, options)
     }
@@ -85,15 +83,24 @@ impl Sim {
     /// A simulation on a mesh of the caller's making, for benchmarks and tests of the mechanics.
     pub fn from_mesh(garment: &Garment, mesh: GarmentMesh, options: &SimOptions) -> Result<Self> {
         let gravity = options.gravity.unwrap_or([0.0, -9.81, 0.0]);
-        garment.check()?;
+        garment.check_geometry()?;
         finite("gravity", &gravity)?;
         finite("wind", &options.wind)?;
         finite("pressure", &[options.pressure])?;
-        let cloth = Cloth::new(garment, mesh.clone())?;
+        let mut cloth = Cloth::new(garment, mesh.clone())?;
         let masses = cloth.masses.clone();
-        let fingerprint = snapshot::fingerprint(&cloth);
-        let system = System::new(cloth, &BuildOptions::from(&options.settings))?;
-        let state = State {
+        let origin = Origin {
+            garment: snapshot::fingerprint(&cloth),
+            bodies: Vec::new(),
+            numbers: options.settings.that_matter(),
+        };
+        let yarns = YarnPart::new(garment, &mesh, &options.settings)?;
+        if let Some(part) = &yarns {
+            cloth = part.rest_of(garment, &mesh)?;
+        }
+        let laid = yarns.as_ref().map(|part| part.yarns.clone());
+        let system = System::with_yarns(cloth, laid, &BuildOptions::from(&options.settings))?;
+        let mut state = State {
             time: 0.0,
             positions: mesh.placed.clone(),
             velocities: vec![Vec3::zeros(); mesh.placed.len()],
@@ -101,6 +108,7 @@ impl Sim {
             u_rates: Vec::new(),
             sliding: Vec::new(),
             strands: Vec::new(),
+            yarn_normals: Vec::new(),
             pins: Vec::new(),
             bodies: Vec::new(),
             body_anchors: Vec::new(),
@@ -110,6 +118,9 @@ impl Sim {
             wind: Vec3::from(options.wind),
             pressure: options.pressure,
         };
+        if let Some(part) = &yarns {
+            part.place(garment, &mut state);
+        }
         Ok(Self {
             garment: garment.clone(),
             settings: options.settings.clone(),
@@ -118,8 +129,9 @@ impl Sim {
             engine: Mutex::new(Engine::new(system, &options.settings)),
             mesh,
             masses,
+            yarns,
             epoch: 1,
-            fingerprint,
+            origin,
         })
     }
 
@@ -134,7 +146,7 @@ impl Sim {
 
     /// The state as bytes.
     pub fn save(&self) -> Result<Vec<u8>> {
-        snapshot::write(&self.state, self.fingerprint)
+        snapshot::write(&self.state, &self.origin)
     }
 
     /// A copy of the state, to go back to with [`Sim::roll_back`]: cheaper than bytes.
@@ -148,9 +160,10 @@ impl Sim {
         self.epoch += 1;
     }
 
-    /// Restores saved bytes of the same garment and bodies; on error nothing changes.
+    /// Restores saved bytes of the same garment, bodies and tunables (threads and the limit of
+    /// vertices may differ, as no bit depends on them); on error nothing changes.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<()> {
-        let mut state = snapshot::read(bytes, self.fingerprint, &self.state)?;
+        let mut state = snapshot::read(bytes, &self.origin, &self.state)?;
         for (b, ((body, _), entry)) in self.bodies.iter().zip(&mut state.bodies).enumerate() {
             for vertices in [&entry.vertices, &entry.target_vertices] {
                 if !vertices.is_empty() && vertices.len() != body.vertices().len() {

@@ -56,6 +56,7 @@ fn case() -> (Cloth, Case) {
         u_rates: Vec::new(),
         sliding: Vec::new(),
         strands: Vec::new(),
+        yarn_normals: Vec::new(),
         pins: Vec::new(),
         bodies: vec![entry],
         body_anchors: anchors,
@@ -74,6 +75,7 @@ fn configuration<'a>(x: &'a [Vec3], x0: &'a [Vec3], world: &'a World<'a>) -> Con
     Configuration {
         x,
         x0,
+        u: &[],
         inv_dt: 0.0,
         world,
     }
@@ -174,6 +176,7 @@ fn wrench_on_a_body_is_the_reaction_of_the_cloth() {
     let at = Configuration {
         x: &case.x,
         x0: &case.x,
+        u: &[],
         inv_dt: 0.0,
         world: &world,
     };

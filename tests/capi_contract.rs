@@ -43,6 +43,7 @@ fn with_sim(sim: *mut toile_sim) -> Vec<(&'static str, toile_status)> {
         toile_sim_pin([0].as_ptr(), 1, ptr::null()),
         toile_sim_unpin([0].as_ptr(), 1),
         toile_sim_pin_yarn_nodes(ptr::null(), 0, ptr::null()),
+        toile_sim_unpin_yarn_nodes(ptr::null(), 0),
         toile_sim_set_blend_region(0, ptr::null(), 0, 0),
         toile_sim_locate(0, zero.as_ptr(), &mut count),
         toile_sim_step(0.01, &mut report),
@@ -63,6 +64,10 @@ fn with_sim(sim: *mut toile_sim) -> Vec<(&'static str, toile_status)> {
         toile_sim_yarn_nodes(ptr::null_mut(), 0, n),
         toile_sim_yarn_offsets(ptr::null_mut(), 0, n),
         toile_sim_yarn_indices(ptr::null_mut(), 0, n),
+        toile_sim_yarn_coordinates(ptr::null_mut(), 0, n),
+        toile_sim_yarn_tensions(ptr::null_mut(), 0, n),
+        toile_sim_yarn_compressions(ptr::null_mut(), 0, n),
+        toile_sim_yarn_slips(ptr::null_mut(), 0, n),
         toile_sim_body_positions(0, ptr::null_mut(), 0, n),
         toile_sim_body_triangles(0, ptr::null_mut(), 0, n),
         toile_sim_energies(&mut energies),
@@ -119,6 +124,8 @@ fn lists_of_this_file_are_complete() {
     listed.extend(["toile_sim_epoch", "toile_sim_time", "toile_sim_free"]);
     listed.extend(["toile_garment_free", "toile_garment_create"]);
     listed.extend(["toile_garment_from_json", "toile_sim_from_scene"]);
+    // those that make an array of its own handle: capi_array
+    listed.extend(["toile_sim_positions_array", "toile_sim_velocities_array"]);
     for name in crate::capi_support::header_functions() {
         let of_object = name.starts_with("toile_sim_") || name.starts_with("toile_garment_");
         if of_object && !name.ends_with("_init") {
@@ -311,6 +318,10 @@ fn arrays_are_copied_out_in_two_calls_or_not_at_all() {
         toile_sim_normals,
         toile_sim_vertex_uv,
         toile_sim_yarn_nodes,
+        toile_sim_yarn_coordinates,
+        toile_sim_yarn_tensions,
+        toile_sim_yarn_compressions,
+        toile_sim_yarn_slips,
     ] {
         check(&sim, call, -7e77);
     }

@@ -16,7 +16,7 @@ use toile::capi::*;
 const NULL_OUT: *mut usize = ptr::null_mut();
 
 #[test]
-fn there_are_no_yarns_yet_and_nobody_pretends() {
+fn triangles_alone_have_no_yarns_and_nobody_pretends() {
     let sim = Sim::small();
     unsafe {
         assert!(array::<f64>(|o, c, k| toile_sim_yarn_nodes(sim.0, o, c, k)).is_empty());
@@ -51,11 +51,85 @@ fn there_are_no_yarns_yet_and_nobody_pretends() {
         let mut out = ptr::null_mut();
         fails(
             toile_sim_create(garment.0, ptr::null(), &mut out),
-            TOILE_E_UNSUPPORTED,
+            TOILE_E_ARGUMENT,
         );
         assert!(out.is_null());
         ok(toile_garment_clear_blend_region(garment.0));
         drop(Sim::new(&garment));
+    }
+}
+
+/// Hosts get the yarns of a panel that a region covers, hold their nodes, and see them slide and pull.
+#[test]
+fn a_panel_of_yarns_is_read_held_and_moved() {
+    let json = br#"{"toile_garment": 1, "name": "swatch", "edge_length": 0.01,
+        "panels": [{"name": "p", "fabric": "y",
+            "vertices": [[0, 0], [0.02, 0], [0.02, 0.018], [0, 0.018]],
+            "edges": [[0, 1], [1, 2], [2, 3], [3, 0]]}],
+        "fabrics": [{"name": "y", "yarns": {"preset": "jersey"}}]}"#;
+    unsafe {
+        let mut out = ptr::null_mut();
+        ok(toile_garment_from_json(
+            json.as_ptr().cast(),
+            json.len(),
+            ptr::null(),
+            &mut out,
+        ));
+        let garment = Garment(out);
+        let uv = [-1.0, -1.0, 1.0, -1.0, 1.0, 1.0, -1.0, 1.0];
+        ok(toile_garment_set_blend_region(
+            garment.0,
+            0,
+            uv.as_ptr(),
+            4,
+            0,
+        ));
+        let sim = Sim::new(&garment);
+        let x = array::<f64>(|o, c, k| toile_sim_yarn_nodes(sim.0, o, c, k));
+        let starts = array::<u32>(|o, c, k| toile_sim_yarn_offsets(sim.0, o, c, k));
+        let nodes = array::<u32>(|o, c, k| toile_sim_yarn_indices(sim.0, o, c, k));
+        let u = array::<f64>(|o, c, k| toile_sim_yarn_coordinates(sim.0, o, c, k));
+        let count = x.len() / 3;
+        assert!(count > 100, "{count}");
+        assert_eq!(*starts.last().unwrap() as usize, nodes.len());
+        assert_eq!(u.len(), nodes.len());
+        assert!(nodes.iter().all(|n| (*n as usize) < count));
+        for y in starts.windows(2) {
+            let u = &u[y[0] as usize..y[1] as usize];
+            assert!(u.windows(2).all(|w| w[0] < w[1]));
+        }
+        let active = array::<u8>(|o, c, k| toile_sim_vertex_active(sim.0, o, c, k));
+        assert!(active.iter().all(|a| *a == 0));
+        let held = [nodes[0], nodes[nodes.len() - 1]];
+        let place = |n: u32| [0, 1, 2].map(|k| x[3 * n as usize + k]);
+        let mut targets = [place(held[0]), place(held[1])].concat();
+        targets[2] += 1e-4;
+        ok(toile_sim_pin_yarn_nodes(
+            sim.0,
+            held.as_ptr(),
+            2,
+            targets.as_ptr(),
+        ));
+        let mut report = filled(toile_step_report_init);
+        ok(toile_sim_step(sim.0, 1e-3, &mut report));
+        let moved = array::<f64>(|o, c, k| toile_sim_yarn_nodes(sim.0, o, c, k));
+        for (k, n) in held.iter().enumerate() {
+            let n = 3 * *n as usize;
+            assert_eq!(moved[n..n + 3], targets[3 * k..3 * k + 3]);
+        }
+        let slips = array::<f64>(|o, c, k| toile_sim_yarn_slips(sim.0, o, c, k));
+        let tensions = array::<f64>(|o, c, k| toile_sim_yarn_tensions(sim.0, o, c, k));
+        let pressed = array::<f64>(|o, c, k| toile_sim_yarn_compressions(sim.0, o, c, k));
+        assert_eq!((slips.len(), tensions.len()), (u.len(), u.len()));
+        assert_eq!(pressed.len(), count);
+        assert!(slips.iter().any(|s| *s != 0.0));
+        assert!(tensions.iter().any(|t| *t > 0.0));
+        assert!(pressed.iter().all(|l| *l >= 0.0));
+        ok(toile_sim_unpin_yarn_nodes(sim.0, held.as_ptr(), 1));
+        fails(
+            toile_sim_unpin_yarn_nodes(sim.0, held.as_ptr(), 1),
+            TOILE_E_ARGUMENT,
+        );
     }
 }
 
@@ -336,4 +410,49 @@ fn world_numbers_go_in_and_come_out() {
         [0.5, -1.0, 2.0, 3.0, -1.0, 4.0]
     );
     assert_eq!(sim.number("solver.newton.max_iterations"), 40.0);
+}
+
+#[test]
+fn a_step_tells_how_far_it_is_and_may_be_stopped_as_if_it_had_not_begun() {
+    struct Told {
+        fractions: Vec<f64>,
+        stop_after: usize,
+    }
+    extern "C" fn watch(user: *mut c_void, progress: *const toile_progress) -> i32 {
+        let (told, progress) = unsafe { (&mut *user.cast::<Told>(), &*progress) };
+        let stage = unsafe { CStr::from_ptr(progress.stage) };
+        assert_eq!(stage, c"step");
+        told.fractions.push(progress.fraction);
+        i32::from(told.fractions.len() >= told.stop_after)
+    }
+    let mut told = Told {
+        fractions: Vec::new(),
+        stop_after: 3,
+    };
+    let mut desc = filled(toile_sim_desc_init);
+    desc.progress = Some(watch);
+    desc.progress_user = (&raw mut told).cast();
+    let garment = square(0.05, 0.0);
+    let mut out = ptr::null_mut();
+    ok(unsafe { toile_sim_create(garment.0, &desc, &mut out) });
+    let sim = Sim(out);
+    // several substeps
+    ok(unsafe { toile_sim_set_number(sim.0, c"solver.step.max".as_ptr(), 0.01) });
+    let before = sim.save();
+    let mut report = filled(toile_step_report_init);
+    ok(unsafe { toile_sim_step(sim.0, 0.05, &mut report) });
+    assert_eq!(report.outcome, TOILE_OUTCOME_CANCELLED);
+    assert_eq!(report.advanced, 0.0);
+    assert!(
+        sim.save() == before,
+        "the stopped step left something behind"
+    );
+    for (k, fraction) in told.fractions.iter().enumerate() {
+        assert!((fraction - 0.2 * k as f64).abs() < 1e-9, "{k}: {fraction}");
+    }
+    told.fractions.clear();
+    told.stop_after = usize::MAX;
+    ok(unsafe { toile_sim_step(sim.0, 0.05, &mut report) });
+    assert_eq!(report.outcome, TOILE_OUTCOME_CONVERGED);
+    assert_eq!(told.fractions.len(), 5);
 }

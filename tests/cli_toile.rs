@@ -100,6 +100,7 @@ fn run_writes_a_complete_summary_models_pattern_and_picture() {
         "max_seam_gap",
         "further_second_motion",
         "body_crossings",
+        "self_crossings",
     ] {
         assert!(summary[key].is_number(), "{key}: {}", summary[key]);
     }
@@ -110,6 +111,7 @@ fn run_writes_a_complete_summary_models_pattern_and_picture() {
     assert!((summary["simulated_seconds"].as_f64().unwrap() - 0.1).abs() < 1e-12);
     assert!(summary["vertices"].as_u64().unwrap() > 50);
     assert_eq!(summary["body_crossings"], 0);
+    assert_eq!(summary["self_crossings"], 0);
     // it hangs at rest: five steps later and a second later it hangs there still
     assert!(summary["further_second_motion"].as_f64().unwrap() < 1e-3);
     let read = |name: &str| std::fs::read(out.join(name)).unwrap();
@@ -136,6 +138,31 @@ fn run_writes_a_complete_summary_models_pattern_and_picture() {
         assert_eq!(code(&output), 0, "{initial}: {}", text(&output.stderr));
         assert!(output.stdout.is_empty());
     }
+}
+
+#[test]
+fn a_garment_that_nothing_holds_ends_its_drape_and_the_summary_says_so() {
+    let folder = Folder::new("falling");
+    let mut free = scene();
+    for key in ["pins", "bodies"] {
+        free[key] = json!([]);
+    }
+    free["run"] = json!({"drape": true, "duration": 0.0, "dt": 0.02});
+    let scene = folder.write("scene.json", &free.to_string());
+    let out = folder.0.join("out");
+    let output = toile(&["run", path(&scene), "--out", path(&out)]);
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    assert!(text(&output.stdout).contains("fall for ever"));
+    let summary: Value =
+        serde_json::from_slice(&std::fs::read(out.join("summary.json")).unwrap()).unwrap();
+    assert_eq!(summary["outcome"], "falling");
+    let reason = summary["reason"].as_str().unwrap();
+    assert!(reason.contains("'square'"), "{reason}");
+    // what the solver will take is not known before it runs, and is not said to be nothing
+    let output = toile(&["info", path(&scene)]);
+    let factor = text(&output.stdout);
+    let line = factor.lines().find(|l| l.starts_with("factor")).unwrap();
+    assert!(!line.contains("0.00"), "{line}");
 }
 
 #[test]
@@ -388,4 +415,54 @@ fn a_real_pattern_on_a_real_body_is_built() {
         all.contains("mean_all") && all.contains("gen_tshirt_specification"),
         "{all}"
     );
+}
+
+#[test]
+fn yarns_are_laid_counted_and_drawn() {
+    let folder = Folder::new("yarns");
+    let mut scene = scene();
+    let garment = &mut scene["garment"];
+    garment["fabrics"] = json!([{"yarns": {
+        "weave": "twill 2/2", "warp_pitch": 0.01, "radius": 0.002,
+    }}]);
+    let file = folder.write("woven.json", &scene.to_string());
+    let svg = folder.0.join("yarns.svg");
+    let args = [
+        "yarns",
+        file.to_str().unwrap(),
+        "--out",
+        svg.to_str().unwrap(),
+    ];
+    let output = toile(&args);
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    // 30 x 30 crossings, two ends to each of 60 yarns
+    let printed = text(&output.stdout);
+    let has = |name: &str, count: usize| {
+        let row = format!("{name:<22} {count}\n");
+        assert!(printed.contains(&row), "{printed}");
+    };
+    has("nodes", 900 + 120);
+    has("yarns", 60);
+    has("corners", 3600);
+    assert!(std::fs::read_to_string(&svg).unwrap().contains("<svg"));
+    // no yarns, and too coarse ones
+    let bare = folder.write("bare.json", &self::scene().to_string());
+    let output = toile(&[
+        "yarns",
+        bare.to_str().unwrap(),
+        "--out",
+        svg.to_str().unwrap(),
+    ]);
+    assert_eq!(code(&output), 1);
+    assert!(text(&output.stderr).contains("no fabric has yarns"));
+    scene["garment"]["fabrics"][0]["yarns"]["radius"] = json!(0.02);
+    let file = folder.write("coarse.json", &scene.to_string());
+    let output = toile(&[
+        "yarns",
+        file.to_str().unwrap(),
+        "--out",
+        svg.to_str().unwrap(),
+    ]);
+    assert_eq!(code(&output), 1);
+    assert!(text(&output.stderr).contains("two radii"));
 }

@@ -3,12 +3,13 @@
 
 use std::path::Path;
 
-const PAGES: [&str; 5] = [
+const PAGES: [&str; 6] = [
     "README.md",
     "ARCHITECTURE.md",
     "CONTRIBUTING.md",
     "CHANGELOG.md",
     "docs/fmi.md",
+    "docs/yarns.md",
 ];
 /// What the build or a run makes.
 const MADE: [&str; 3] = ["target", "out", "build"];

@@ -69,6 +69,11 @@ fn results_are_the_same_bits_for_every_master() {
 }
 
 #[test]
+fn deforming_bodies_are_driven_by_arrays() {
+    python(&["test_deforming.py"]);
+}
+
+#[test]
 fn states_come_back_and_damaged_ones_do_no_harm() {
     python(&["test_states.py"]);
 }

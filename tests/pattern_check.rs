@@ -128,7 +128,10 @@ fn numbers_that_cannot_be_are_refused() {
         |g| g.panels[1].edge_length = Some(-0.1),
         &["panel 'second'", "-0.1"],
     );
-    refused(|g| g.edge_length = 1e-6, &["edge length 0.000001", "limit"]);
+    refused(
+        |g| g.edge_length = 1e-6,
+        &["edge length of 0.000001", "limit"],
+    );
     refused(|g| g.edge_length = 1e-200, &["limit"]);
     refused(
         |g| g.panels[0].outline[0].curve = Curve::Quadratic(Vec2::new(f64::NAN, 0.0)),

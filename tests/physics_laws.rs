@@ -443,6 +443,8 @@ fn a_refused_or_failed_call_leaves_the_state_as_it_was() {
     // a step that cannot be cut as far as it would have to be
     sim.set_number("solver.step.min", 0.02).unwrap();
     sim.set_number("solver.newton.max_iterations", 1.0).unwrap();
+    // a snapshot has the tunables too
+    let before = sim.save().unwrap();
     errors.push(sim.step(0.03).unwrap_err());
     assert!(sim.save().unwrap() == before, "a failed step left a trace");
     for error in &errors {
@@ -501,4 +503,34 @@ fn a_stopped_drape_keeps_what_it_did_and_goes_on() {
     assert_eq!(report.outcome, Outcome::Converged);
     assert!(report.max_seam_gap < 2e-3 && report.min_gap > -1e-3);
     assert_eq!(sim.report().unwrap().outcome, Outcome::Converged);
+}
+
+#[test]
+fn a_relative_tolerance_spares_iterations_and_keeps_the_motion() {
+    let fall = |relative: f64| {
+        let settings = Settings {
+            newton_velocity_tolerance: 1e-9,
+            newton_relative_tolerance: relative,
+            self_contact: 0.0,
+            ..Settings::default()
+        };
+        let mut sim = sheet_with(0.3, 8, Fabric::default(), [0.0, -G, 0.0], settings);
+        let lying: Vec<[f64; 3]> = sim.positions().iter().map(|p| [p.x, 0.0, p.y]).collect();
+        sim.set_positions(&lying, None).unwrap();
+        sim.pin(&[0, 8], None).unwrap();
+        let mut iterations = 0;
+        for _ in 0..10 {
+            iterations += sim.step(0.02).unwrap().newton_iterations;
+        }
+        (sim.positions().to_vec(), iterations)
+    };
+    let (exact, most) = fall(0.0);
+    let way = exact.iter().map(|p| -p.y).fold(0.0, f64::max);
+    for (relative, part) in [(1e-3, 1e-2), (1e-6, 1e-4)] {
+        let (near, fewer) = fall(relative);
+        let off = furthest(&exact, &near) / way;
+        println!("{relative}: {fewer} of {most} iterations, {off:.1e} of the way beside");
+        assert!(fewer < most, "{fewer} of {most} iterations");
+        assert!(off < part, "{off} of the way beside");
+    }
 }

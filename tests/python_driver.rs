@@ -73,6 +73,78 @@ with toile.Sim(garment) as sim:
     print("stepped", report.outcome.name, toile.__file__)
 "#;
 
+/// Environments that `scripts/pythons.sh` has made, one for each version of Python that is here.
+fn environments() -> Vec<PathBuf> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/pythons");
+    let found = std::fs::read_dir(root).into_iter().flatten().flatten();
+    let mut found: Vec<PathBuf> = found.map(|e| e.path().join("bin/python")).collect();
+    found.retain(|p| p.is_file());
+    found.sort();
+    found
+}
+
+/// One wheel for all versions: what `make wheel` builds passes the package's tests on each.
+#[test]
+fn a_wheel_passes_the_tests_on_every_python_that_is_here() {
+    let Some(python) = python() else { return };
+    let environments = environments();
+    if environments.is_empty() {
+        crate::capi_support::skip("target/pythons is not there: run scripts/pythons.sh");
+        return;
+    }
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let folder = std::env::temp_dir().join(format!("toile-wheel-{}", std::process::id()));
+    let _ = std::fs::remove_dir_all(&folder);
+    run(Command::new(&python)
+        .args(["-m", "pip", "wheel", "--disable-pip-version-check"])
+        .args(["--no-deps", "--wheel-dir"])
+        .arg(&folder)
+        .arg("./python")
+        .current_dir(root)
+        .env("PIP_NO_INDEX", "1")
+        .env("PIP_FIND_LINKS", root.join("target/wheels"))
+        .env("TOILE_LIBRARY", library()));
+    let wheels: Vec<PathBuf> = std::fs::read_dir(&folder)
+        .unwrap()
+        .map(|e| e.unwrap().path())
+        .collect();
+    let [wheel] = &wheels[..] else {
+        panic!("one wheel is expected: {wheels:?}")
+    };
+    assert!(wheel.to_string_lossy().contains("-py3-none-"), "{wheel:?}");
+    for environment in environments {
+        run(Command::new(&environment)
+            .args(["-m", "pip", "install", "--disable-pip-version-check"])
+            .args(["--no-index", "--no-deps", "--force-reinstall", "--quiet"])
+            .arg(wheel));
+        let told = run(Command::new(&environment)
+            .args(["-m", "pytest", "-q", "-p", "no:cacheprovider"])
+            // a figure about one machine, not about a version
+            .args(["-k", "not ten_thousand_vertices", "."])
+            .current_dir(root.join("python/tests"))
+            .env("PYTHONDONTWRITEBYTECODE", "1")
+            .env_remove("PYTHONPATH")
+            .env_remove("TOILE_LIBRARY"));
+        assert!(
+            told.contains(" passed") && told.contains("deselected"),
+            "{told}"
+        );
+        // what needs packages that are not there is compiled at least
+        run(Command::new(&environment)
+            .args(["-m", "compileall", "-q", "python/examples", "tests/fmi"])
+            .current_dir(root)
+            .env("PYTHONPYCACHEPREFIX", folder.join("cache")));
+        let said = run(Command::new(&environment)
+            .arg("-c")
+            .arg(format!("{USE}\nimport toile.fmu\n"))
+            .current_dir(&folder)
+            .env_remove("PYTHONPATH")
+            .env_remove("TOILE_LIBRARY"));
+        assert!(said.contains("stepped") && said.contains("site-packages"));
+    }
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
 #[test]
 fn pip_installs_the_package_with_its_library_into_a_clean_environment() {
     let Some(python) = python() else { return };

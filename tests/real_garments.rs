@@ -5,6 +5,7 @@ use toile::body::Body;
 use toile::math::Vec3;
 use toile::pattern::import::garment_from_json;
 use toile::sim::{ContactSettings, DrapeOptions, Sim, SimOptions};
+use toile::system::contact::crossing::SewnSurface;
 
 fn data() -> Option<PathBuf> {
     match std::env::var_os("TOILE_DATA") {
@@ -72,6 +73,15 @@ fn drapes_to_rest(name: &str, edge_length: f64) {
         "{} edges cross the body",
         crossing.len()
     );
+    let sewn = SewnSurface::new(sim.mesh(), sim.positions());
+    let own = sewn.crossings(1000).expect("finite");
+    println!(
+        "{name}: rims within {:.3} mm of their seams",
+        1e3 * sewn.moved
+    );
+    println!("{name}: {} edges through the garment", own.len());
+    assert!(own.is_empty(), "{} edges cross the garment", own.len());
+    assert!(sewn.moved < 1e-3, "{} m", sewn.moved);
     let inside = sim
         .positions()
         .iter()

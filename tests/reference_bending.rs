@@ -70,6 +70,7 @@ fn cylinder_ratio(pattern: Pattern, model: BendingModel, angle: f64, b: [f64; 2]
     let at = toile::system::term::Configuration {
         x: &x,
         x0: &x,
+        u: &[],
         inv_dt: 0.0,
         world: &still(0.0),
     };

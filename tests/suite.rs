@@ -13,6 +13,8 @@ mod self_contact_cases;
 mod sheets;
 mod terms_cases;
 mod tri_common;
+mod yarn_cases;
+mod yarn_common;
 
 #[path = "abi.rs"]
 mod abi;
@@ -26,6 +28,8 @@ mod body_mesh;
 mod body_shapes;
 #[path = "c_examples.rs"]
 mod c_examples;
+#[path = "capi_array.rs"]
+mod capi_array;
 #[path = "capi_contract.rs"]
 mod capi_contract;
 #[path = "capi_random_calls.rs"]
@@ -40,6 +44,8 @@ mod capi_threads;
 mod cli_toile;
 #[path = "docs.rs"]
 mod docs;
+#[path = "drape_ends.rs"]
+mod drape_ends;
 #[path = "fmi.rs"]
 mod fmi;
 #[path = "hard_cases.rs"]
@@ -74,6 +80,8 @@ mod real_garments;
 mod reference_bending;
 #[path = "reference_membrane.rs"]
 mod reference_membrane;
+#[path = "rest.rs"]
+mod rest;
 #[path = "scene_motion.rs"]
 mod scene_motion;
 #[path = "scene_motion_errors.rs"]
@@ -84,6 +92,8 @@ mod scene_reader;
 mod self_contact_sheets;
 #[path = "self_contact_term.rs"]
 mod self_contact_term;
+#[path = "snapshots.rs"]
+mod snapshots;
 #[path = "terms_fd.rs"]
 mod terms_fd;
 #[path = "terms_physics.rs"]
@@ -94,3 +104,23 @@ mod terms_symmetry;
 mod tri_garments;
 #[path = "tri_real.rs"]
 mod tri_real;
+#[path = "yarn_charts.rs"]
+mod yarn_charts;
+#[path = "yarn_contacts.rs"]
+mod yarn_contacts;
+#[path = "yarn_friction.rs"]
+mod yarn_friction;
+#[path = "yarn_garments.rs"]
+mod yarn_garments;
+#[path = "yarn_knit.rs"]
+mod yarn_knit;
+#[path = "yarn_laws.rs"]
+mod yarn_laws;
+#[path = "yarn_sims.rs"]
+mod yarn_sims;
+#[path = "yarn_terms_fd.rs"]
+mod yarn_terms_fd;
+#[path = "yarn_terms_symmetry.rs"]
+mod yarn_terms_symmetry;
+#[path = "yarn_weave.rs"]
+mod yarn_weave;

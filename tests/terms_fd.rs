@@ -27,6 +27,7 @@ fn gradients_and_exact_hessians_are_the_derivatives() {
                 f(&Configuration {
                     x: &x,
                     x0: &case.x0,
+                    u: &[],
                     inv_dt: case.inv_dt,
                     world: &world,
                 })
@@ -93,6 +94,7 @@ fn psd_hessians_have_no_negative_eigenvalue() {
         let at = Configuration {
             x: &case.x,
             x0: &case.x0,
+            u: &[],
             inv_dt: case.inv_dt,
             world: &world,
         };
@@ -120,6 +122,7 @@ fn psd_and_exact_agree_at_rest() {
         let at = Configuration {
             x: &case.x,
             x0: &case.x0,
+            u: &[],
             inv_dt: case.inv_dt,
             world: &world,
         };
@@ -160,6 +163,7 @@ fn rest_gradients_are_the_derivatives_by_shape_and_fabric() {
         let at = Configuration {
             x: &case.x,
             x0: &case.x0,
+            u: &[],
             inv_dt: case.inv_dt,
             world: &world,
         };

@@ -49,6 +49,7 @@ fn state(positions: &[Vec3]) -> State {
         u_rates: Vec::new(),
         sliding: Vec::new(),
         strands: Vec::new(),
+        yarn_normals: Vec::new(),
         pins: Vec::new(),
         bodies: Vec::new(),
         body_anchors: Vec::new(),
@@ -69,6 +70,7 @@ fn weight_pressure_and_wind_add_up_to_their_resultants() {
     let at = Configuration {
         x: &x,
         x0: &x,
+        u: &[],
         inv_dt: 0.0,
         world: &w,
     };
@@ -144,6 +146,7 @@ fn an_open_seam_pulls_with_a_bounded_force_and_a_sewn_one_holds() {
         let at = Configuration {
             x,
             x0: x,
+            u: &[],
             inv_dt: 0.0,
             world: &w,
         };
@@ -165,6 +168,7 @@ fn an_open_seam_pulls_with_a_bounded_force_and_a_sewn_one_holds() {
     let at = Configuration {
         x: &open,
         x0: &open,
+        u: &[],
         inv_dt: 0.0,
         world: &w,
     };
@@ -197,6 +201,7 @@ fn the_angle_across_a_seam_acts_when_it_is_closed() {
         let at = Configuration {
             x: &folded,
             x0: &folded,
+            u: &[],
             inv_dt: 0.0,
             world: &w,
         };
@@ -205,6 +210,7 @@ fn the_angle_across_a_seam_acts_when_it_is_closed() {
     let at = Configuration {
         x: &shut,
         x0: &shut,
+        u: &[],
         inv_dt: 0.0,
         world: &w,
     };

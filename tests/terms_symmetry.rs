@@ -17,6 +17,7 @@ fn internal_terms_have_no_net_force_and_no_torque() {
         let at = Configuration {
             x: &case.x,
             x0: &case.x0,
+            u: &[],
             inv_dt: case.inv_dt,
             world: &world,
         };
@@ -66,12 +67,14 @@ fn internal_energies_are_invariant_under_rigid_motion() {
         let at = Configuration {
             x: &case.x,
             x0: &case.x0,
+            u: &[],
             inv_dt: case.inv_dt,
             world: &world,
         };
         let after = Configuration {
             x: &mx,
             x0: &mx0,
+            u: &[],
             ..at
         };
         for e in sample(term) {
@@ -91,6 +94,7 @@ fn internal_energies_are_invariant_under_rigid_motion() {
         let slow = Configuration {
             x: &mx,
             x0: &case.x,
+            u: &[],
             inv_dt: 100.0,
             world: &world,
         };
@@ -128,6 +132,7 @@ fn totally_degenerate_states_stay_finite() {
                 let at = Configuration {
                     x,
                     x0: &point,
+                    u: &[],
                     inv_dt,
                     world: &world,
                 };

@@ -211,6 +211,25 @@ fn sizes_are_refused_before_memory_is_taken() {
         let error = triangulate(&garment, scale, 1_000_000).unwrap_err();
         assert_eq!(error.status, Status::Limit, "{error}");
     }
+    // the text names the panel that asks for most, and whose length it is
+    let mut own = garment.clone();
+    own.panels[1].edge_length = Some(1e-5);
+    let error = triangulate(&own, 1.0, 1_000_000).unwrap_err().to_string();
+    let wanted = format!("panel '{}'", own.panels[1].name);
+    assert!(error.contains(&wanted), "{error}");
+    assert!(
+        error.contains("its own edge length of 0.00001 m"),
+        "{error}"
+    );
+    own.panels[1].edge_length = None;
+    own.edge_length = 1e-5;
+    let error = triangulate(&own, 1.0, 1_000_000).unwrap_err().to_string();
+    assert!(
+        error.contains("the garment's edge length of 0.00001 m"),
+        "{error}"
+    );
+    let error = own.check().unwrap_err().to_string();
+    assert!(error.contains("the garment's"), "{error}");
     for scale in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let error = triangulate(&garment, scale, 1_000_000).unwrap_err();
         assert_eq!(error.status, Status::Argument, "{error}");

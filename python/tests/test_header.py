@@ -21,7 +21,7 @@ SCALARS = {
     "char": ctypes.c_char,
 }
 CALLBACKS = {"toile_log_fn": _ffi.log_fn, "toile_progress_fn": _ffi.progress_fn}
-HANDLES = {"toile_garment", "toile_body", "toile_sim"}
+HANDLES = {"toile_garment", "toile_body", "toile_sim", "toile_array"}
 
 
 @pytest.fixture(scope="module")

@@ -2,23 +2,14 @@
 
 import json
 import os
+import threading
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import toile
-
-SQUARE = [[0, 0], [0.4, 0], [0.4, 0.4], [0, 0.4]]
-# lies flat: u to +x, v to -z
-FLAT = (-np.sqrt(0.5), 0, 0, np.sqrt(0.5))
-
-
-def square(edge_length=0.05):
-    garment = toile.Garment("square", edge_length)
-    garment.add_panel("square", SQUARE, position=(-0.2, 0.5, 0.2), quaternion_xyzw=FLAT)
-    return garment
-
+from square import SQUARE, square
 
 def test_arrays_have_the_shapes_and_values_that_were_asked_for():
     with toile.Sim(square()) as sim:
@@ -108,16 +99,71 @@ def test_errors_carry_the_text_of_the_library():
         toile.Body.mesh(np.zeros((3, 3)), [[0, 1, -2]])
 
 
-def test_positions_outlive_steps_and_the_simulation():
+@pytest.mark.parametrize("wrong", [1j, True, "1.0", None], ids=repr)
+def test_what_is_no_real_number_is_refused_and_not_converted(wrong):
     with toile.Sim(square()) as sim:
-        kept = sim.positions
-        expected = kept.copy()
-        for _ in range(3):
-            sim.step(0.01)
-        assert not np.array_equal(sim.positions, expected)
-    filler = [np.full(kept.shape, 7.0) for _ in range(100)]
-    np.testing.assert_array_equal(kept, expected)
-    assert len(filler) == 100
+        x = np.full(sim.positions.shape, wrong)
+        for call in (
+            lambda: sim.set_positions(x),
+            lambda: sim.set_positions(sim.positions, x),
+            lambda: sim.pin([0], x[:1]),
+            lambda: sim.pin(x[:, 0]),
+            lambda: sim.set_body_pose(0, x[0]),
+            lambda: toile.Body.mesh(x, [[0, 1, 2]]),
+            lambda: toile.Body.grid(np.full((3, 3, 3), wrong), (0, 0, 0), 0.1),
+        ):
+            with pytest.raises(ValueError, match="must be"):
+                call()
+
+
+def test_wrong_shapes_are_refused():
+    with toile.Sim(square()) as sim:
+        n = len(sim.positions)
+        with pytest.raises(ValueError, match="shape"):
+            sim.set_positions(np.zeros((n, 2)))
+        with pytest.raises(ValueError, match="shape"):
+            sim.set_positions(np.zeros(3 * n))
+        with pytest.raises(toile.UsageError, match=str(n)):
+            sim.set_positions(np.zeros((n - 1, 3)))
+        with pytest.raises(ValueError, match="2 targets for 1"):
+            sim.pin([0], np.zeros((2, 3)))
+
+
+def test_use_after_close_is_refused():
+    sim = toile.Sim(square())
+    sim.close()
+    for call in (
+        lambda: sim.positions, lambda: sim.velocities, lambda: sim.normals, lambda: sim.epoch,
+        lambda: sim.time, lambda: sim.step(0.01), lambda: sim.drape(), lambda: sim.save(),
+        lambda: sim.pin([0]), lambda: sim["gravity.y"], lambda: sim.energies,
+    ):
+        with pytest.raises(ValueError, match="this Sim is closed"):
+            call()
+
+
+def test_two_threads_on_one_simulation_raise():
+    """While one drapes, another may neither step nor read; afterwards both may."""
+    with toile.Sim(square()) as sim:
+        sim.pin([0])
+        refused = []
+
+        def attempt(call):
+            try:
+                call()
+            except toile.UsageError as e:
+                refused.append(str(e))
+
+        def progress(*_):
+            calls = [lambda: sim.step(0.01), lambda: sim.positions, lambda: sim.time]
+            threads = [threading.Thread(target=attempt, args=(c,)) for c in calls[:2]]
+            [t.start() for t in threads]
+            [t.join() for t in threads]
+            attempt(calls[0])
+            return False
+
+        sim.drape(progress=progress)
+        assert len(refused) == 3 and all("another call" in text for text in refused), refused
+        sim.step(0.01)
 
 
 def test_json_and_svg_come_back():

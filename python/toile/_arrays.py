@@ -14,9 +14,17 @@ PathLike = Union[str, "os.PathLike[str]"]
 Array = Any
 
 
+def _real(array: Array, what: str) -> np.ndarray:
+    """Numbers as contiguous float64; what is no real number is refused, not converted."""
+    a = np.asarray(array)
+    if a.dtype.kind not in "iuf" and a.size:
+        raise ValueError(f"{what}: must be real numbers, are {a.dtype}")
+    return np.ascontiguousarray(a, dtype=np.float64)
+
+
 def _f64(array: Array, columns: int, what: str) -> np.ndarray:
     """A contiguous copy or view with `columns` columns."""
-    a = np.ascontiguousarray(array, dtype=np.float64)
+    a = _real(array, what)
     if a.ndim == 1 and a.size == columns:
         a = a.reshape(1, columns)
     if a.ndim != 2 or a.shape[1] != columns:
@@ -37,7 +45,7 @@ def _u32(array: Array, what: str) -> np.ndarray:
 
 
 def _vector(values: Array, count: int, what: str) -> Any:
-    a = np.asarray(values, dtype=np.float64).reshape(-1)
+    a = _real(values, what).reshape(-1)
     if a.size != count:
         raise ValueError(f"{what}: {a.size} numbers, expected {count}")
     return (ctypes.c_double * count)(*a)

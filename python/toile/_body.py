@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from . import _ffi
-from ._arrays import Array, PathLike, _f64, _pointer, _u32, _vector
+from ._arrays import Array, PathLike, _f64, _pointer, _real, _u32, _vector
 from ._errors import _check
 from ._ffi import lib
 from ._owner import _Owner
@@ -50,7 +50,7 @@ class Body(_Owner):
     @classmethod
     def grid(cls, values: Array, origin: Array, cell_size: float) -> Body:
         """Signed distances [m] at grid nodes, shape (nx, ny, nz), first node at `origin` [m]."""
-        data = np.ascontiguousarray(values, dtype=np.float64)
+        data = _real(values, "values")
         if data.ndim != 3:
             raise ValueError(f"values: shape {data.shape}, expected (nx, ny, nz)")
         desc = _ffi.new("toile_sdf_grid_desc")

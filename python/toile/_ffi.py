@@ -66,6 +66,8 @@ STRUCTS: dict[str, list[tuple[str, Any]]] = {
         ("max_vertices", c_uint64),
         ("log", log_fn),
         ("log_user", c_void_p),
+        ("progress", progress_fn),
+        ("progress_user", c_void_p),
     ],
     "toile_contact_desc": [
         ("friction", c_double),
@@ -200,15 +202,11 @@ FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
     "toile_sim_report": (c_int32, [handle, _p("toile_step_report")]),
     "toile_sim_epoch": (c_uint64, [handle]),
     "toile_sim_time": (c_double, [handle]),
-    "toile_sim_positions": (c_int32, _copy_f64),
-    "toile_sim_velocities": (c_int32, _copy_f64),
     "toile_sim_normals": (c_int32, _copy_f64),
     "toile_sim_vertex_panels": (c_int32, _copy_u32),
     "toile_sim_vertex_uv": (c_int32, _copy_f64),
     "toile_sim_vertex_active": (c_int32, [handle, POINTER(c_uint8), c_size_t, _size]),
     "toile_sim_triangles": (c_int32, _copy_u32),
-    "toile_sim_positions_view": (c_int32, [handle, _p("toile_view_f64")]),
-    "toile_sim_velocities_view": (c_int32, [handle, _p("toile_view_f64")]),
     "toile_sim_yarn_nodes": (c_int32, _copy_f64),
     "toile_sim_yarn_offsets": (c_int32, _copy_u32),
     "toile_sim_yarn_indices": (c_int32, _copy_u32),
@@ -220,6 +218,10 @@ FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
     "toile_sim_save": (c_int32, [handle, POINTER(c_uint8), c_size_t, _size]),
     "toile_sim_restore": (c_int32, [handle, POINTER(c_uint8), c_size_t]),
     "toile_sim_free": (None, [handle]),
+    "toile_sim_positions_array": (c_int32, [handle, _out]),
+    "toile_sim_velocities_array": (c_int32, [handle, _out]),
+    "toile_array_view": (c_int32, [handle, _p("toile_view_f64")]),
+    "toile_array_free": (None, [handle]),
 }
 
 

@@ -14,6 +14,10 @@ class Outcome(enum.IntEnum):
     SUBSTEPPED = 1
     ITERATION_LIMIT = 2
     CANCELLED = 3
+    #: No step, however short, led lower.
+    STALLED = 4
+    #: Nothing holds a part of the garment, and nothing lies on its way.
+    FALLING = 5
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,8 @@ from ._body import Body
 from ._errors import _check
 from ._ffi import lib
 from ._garment import Garment
+from ._interrupt import _Interrupts
+from ._kept import _kept
 from ._owner import _Owner
 from ._report import Energies, Report, SystemInfo, _fields, _report
 
@@ -145,27 +147,31 @@ class Sim(_Owner):
         max_steps: int = 0,
         progress: Optional[ProgressCallback] = None,
     ) -> Report:
-        """Sews and drapes to rest; 0 takes the library's setting. An exception in `progress`
-        stops the drape and comes out of this call."""
+        """Sews and drapes to rest; 0 takes the library's setting. An exception in `progress`, or
+        Ctrl-C, stops the drape where it is and comes out of this call."""
         desc = _ffi.new("toile_drape_desc")
         desc.force_tolerance, desc.max_steps = force_tolerance, max_steps
         raised: list[BaseException] = []
+        interrupts = _Interrupts()
 
         def call(_user: Any, pointer: int) -> int:
-            state = ctypes.cast(pointer, ctypes.POINTER(_ffi.types["toile_progress"])).contents
             try:
+                if interrupts.asked:
+                    return 1
+                if progress is None:
+                    return 0
+                state = ctypes.cast(pointer, ctypes.POINTER(_ffi.types["toile_progress"])).contents
                 stage = (state.stage or b"").decode()
-                go_on = progress is None or progress(state.fraction, stage, state.residual)
-                return 1 if go_on is False else 0
+                return 1 if progress(state.fraction, stage, state.residual) is False else 0
             except BaseException as e:
                 raised.append(e)
                 return 1
 
         callback = _ffi.progress_fn(call)
-        if progress is not None:
-            desc.progress = callback
+        desc.progress = callback
         report = _ffi.new("toile_step_report")
-        status = lib.toile_sim_drape(self.handle, ctypes.byref(desc), ctypes.byref(report))
+        with interrupts:
+            status = lib.toile_sim_drape(self.handle, ctypes.byref(desc), ctypes.byref(report))
         if raised:
             raise raised[0]
         _check(status)
@@ -177,30 +183,19 @@ class Sim(_Owner):
         _check(lib.toile_sim_report(self.handle, ctypes.byref(report)))
         return _report(report)
 
-    def _view(self, function: Any) -> np.ndarray:
-        view = _ffi.new("toile_view_f64")
-        _check(function(self.handle, ctypes.byref(view)))
-        if view.count == 0:
-            return np.zeros((0, 3))
-        address = ctypes.cast(view.data, ctypes.c_void_p).value
-        length = (view.count - 1) * view.stride + view.components * 8
-        memory = (ctypes.c_uint8 * length).from_address(address)
-        shape = (view.count, view.components)
-        # the library may move its memory in any call, and frees it with the simulation
-        out = np.ndarray(shape, np.float64, memory, strides=(view.stride, 8)).copy()
-        out.flags.writeable = False
-        return out
-
     @property
     def positions(self) -> np.ndarray:
-        """Positions [m] as they are now, shape (vertices, 3), read-only: an array of its own, which
-        later calls neither change nor invalidate."""
-        return self._view(lib.toile_sim_positions_view)
+        """Positions [m] as they are now, shape (vertices, 3), read-only, in the library's own memory.
+
+        Later calls neither change nor invalidate the array, nor does closing the simulation: the
+        library makes a copy for itself if it has to change them while the array is still there.
+        """
+        return _kept(lib.toile_sim_positions_array, self.handle)
 
     @property
     def velocities(self) -> np.ndarray:
         """Velocities [m/s], shape (vertices, 3), like `positions`."""
-        return self._view(lib.toile_sim_velocities_view)
+        return _kept(lib.toile_sim_velocities_array, self.handle)
 
     def set_positions(self, positions: Array, velocities: Optional[Array] = None) -> None:
         """Sets every position [m] and velocity [m/s], shape (vertices, 3); ``None`` is zero."""

@@ -30,8 +30,9 @@ ProgressCallback = Callable[[int, int, int], None]
 class Cloth:
     """One instance of a toile FMU, FMI 2 or 3, by variable names. A context manager.
 
-    Values may be set before :meth:`initialize` (parameters) and between steps (inputs). Reading a
-    variable gives a float, an int, a bool, or an array of the variable's shape, always a copy.
+    Values may be set before :meth:`initialize` (parameters) and between steps (inputs), arrays whole.
+    Reading a variable gives a float, an int, a bool, or an array of the variable's shape, always a
+    copy.
     """
 
     def __init__(self, archive: Union[str, Path], folder: Union[str, Path, None] = None) -> None:
@@ -123,10 +124,14 @@ class Cloth:
         values = self._call(name, lambda: get(references, nValues=count))
         return np.array(values).reshape(shape) if shape else values[0]
 
-    def __setitem__(self, name: str, value: Number) -> None:
+    def __setitem__(self, name: str, value: Union[Number, np.ndarray]) -> None:
         fmu, variable = self._open(), self._variable(name)
         put = getattr(fmu, "set" + variable.type)
-        self._call(name, lambda: put([variable.valueReference], [value]))
+        shape = tuple(variable.shape or ()) if self._three else ()
+        if np.shape(value) != shape:
+            raise ValueError(f"{name}: shape {np.shape(value)}, expected {shape}")
+        values = np.ravel(value).tolist()
+        self._call(name, lambda: put([variable.valueReference], values))
 
     def initialize(self, start: float = 0.0) -> None:
         """Ends the setting of parameters; drapes if the parameter ``drape`` says so."""

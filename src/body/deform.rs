@@ -11,6 +11,7 @@ use super::tree::Tree;
 use super::{analytic, sign};
 use crate::error::Result;
 use crate::math::Vec3;
+use crate::math::hash::Hash;
 use crate::math::parallel::Workers;
 use std::sync::Arc;
 
@@ -40,6 +41,18 @@ fn automatic_cell(report: &MeshReport) -> f64 {
 }
 
 impl MeshBody {
+    /// Takes all that makes the body into a hash.
+    pub(super) fn add_to(&self, hash: &mut Hash) {
+        hash.add(b"mesh");
+        for vertices in [&self.rest.vertices, &self.vertices] {
+            hash.numbers(vertices.iter().flat_map(|p| [p.x, p.y, p.z]));
+        }
+        for v in self.triangles().as_flattened() {
+            hash.add(&v.to_le_bytes());
+        }
+        hash.numbers([self.field.cell_size()]);
+    }
+
     pub(super) fn new(
         positions: &[[f64; 3]],
         triangles: &[[u32; 3]],

@@ -12,6 +12,7 @@
 use super::{Distance, spline};
 use crate::error::{Error, Result};
 use crate::math::Vec3;
+use crate::math::hash::Hash;
 
 /// Largest number of nodes [1].
 const MAX_NODES: usize = 1 << 27;
@@ -29,6 +30,16 @@ pub(super) struct Grid {
 }
 
 impl Grid {
+    /// Takes all that makes the grid into a hash.
+    pub(super) fn add_to(&self, hash: &mut Hash) {
+        hash.add(b"grid");
+        for count in self.counts {
+            hash.add(&(count as u64).to_le_bytes());
+        }
+        hash.numbers(self.origin.iter().copied().chain([self.h]));
+        hash.numbers(self.coefficients.iter().copied());
+    }
+
     pub(super) fn new(
         counts: [usize; 3],
         origin: [f64; 3],

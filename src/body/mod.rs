@@ -23,6 +23,7 @@ mod triangle;
 pub use mesh::MeshReport;
 
 use crate::error::{Error, Result};
+use crate::math::hash::Hash;
 use crate::math::parallel::Workers;
 use crate::math::{Mat3, Rotation, Vec3};
 use std::sync::Arc;
@@ -346,6 +347,31 @@ impl Body {
     /// they take.
     pub fn field_size(&self) -> Option<(Vec<usize>, usize)> {
         self.as_mesh().map(|m| (m.field.bricks(), m.field.bytes()))
+    }
+
+    /// A number that two bodies share only if their shapes are the same, bit by bit.
+    pub fn fingerprint(&self) -> u64 {
+        let mut hash = Hash::default();
+        match &*self.shape {
+            Shape::Sphere { radius } => {
+                hash.add(b"sphere");
+                hash.numbers([*radius]);
+            }
+            Shape::Capsule {
+                half_length,
+                radius,
+            } => {
+                hash.add(b"capsule");
+                hash.numbers([*half_length, *radius]);
+            }
+            Shape::Plane { normal, offset } => {
+                hash.add(b"plane");
+                hash.numbers([normal.x, normal.y, normal.z, *offset]);
+            }
+            Shape::Grid(grid) => grid.add_to(&mut hash),
+            Shape::Mesh(mesh) => mesh.add_to(&mut hash),
+        }
+        hash.value()
     }
 
     fn as_mesh(&self) -> Option<&deform::MeshBody> {

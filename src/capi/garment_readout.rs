@@ -23,10 +23,9 @@ pub unsafe extern "C" fn toile_garment_panel_count(
     out_count: *mut u32,
 ) -> toile_status {
     entry!({
-        input::target(out_count, "out_count")?;
-        let count = read(garment, |o| index(o.garment.panels.len(), "panels"))?;
-        output::put(out_count, count);
-        Ok(())
+        output::count(&GARMENTS, garment.addr(), out_count, "panels", |o| {
+            o.garment.panels.len()
+        })
     })
 }
 
@@ -37,10 +36,9 @@ pub unsafe extern "C" fn toile_garment_seam_count(
     out_count: *mut u32,
 ) -> toile_status {
     entry!({
-        input::target(out_count, "out_count")?;
-        let count = read(garment, |o| index(o.garment.seams.len(), "seams"))?;
-        output::put(out_count, count);
-        Ok(())
+        output::count(&GARMENTS, garment.addr(), out_count, "seams", |o| {
+            o.garment.seams.len()
+        })
     })
 }
 

@@ -41,6 +41,7 @@ mod log;
 mod output;
 mod panel;
 
+pub mod array;
 pub mod body;
 pub mod garment;
 pub mod garment_readout;
@@ -50,6 +51,7 @@ pub mod sim;
 pub mod status;
 pub mod types;
 
+pub use array::*;
 pub use body::*;
 pub use garment::*;
 pub use garment_readout::*;

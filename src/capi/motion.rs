@@ -6,8 +6,49 @@ use super::input;
 use super::log::{Log, TOILE_LOG_INFO, TOILE_LOG_WARNING};
 use super::sim::{SIMS, write};
 use super::status::toile_status;
-use super::types::{toile_drape_desc, toile_progress, toile_sim, toile_step_report};
+use super::types::{
+    toile_drape_desc, toile_progress, toile_progress_fn, toile_sim, toile_step_report,
+};
 use crate::sim::{DrapeOptions, Outcome, Progress, StepReport};
+use std::ffi::c_void;
+
+/// The host's progress callback.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Watcher {
+    callback: toile_progress_fn,
+    user: *mut c_void,
+}
+
+// SAFETY: the header tells the host that its callback runs on the thread that steps, whichever that
+// is; `user` is only handed on.
+unsafe impl Send for Watcher {}
+// SAFETY: as above.
+unsafe impl Sync for Watcher {}
+
+impl Watcher {
+    pub(super) fn new(callback: toile_progress_fn, user: *mut c_void) -> Self {
+        Self { callback, user }
+    }
+
+    pub(super) fn none() -> Self {
+        Self::new(None, std::ptr::null_mut())
+    }
+
+    /// Tells the host; whether it wants to go on.
+    fn go_on(&self, progress: &Progress) -> bool {
+        let Some(callback) = self.callback else {
+            return true;
+        };
+        let stage = c_text(progress.stage);
+        let progress = toile_progress {
+            struct_size: size_of::<toile_progress>(),
+            fraction: progress.fraction,
+            stage: stage.as_ptr(),
+            residual: progress.residual,
+        };
+        callback(self.user, &raw const progress) == 0
+    }
+}
 
 /// The report as C sees it.
 pub(super) fn report_for_c(report: &StepReport) -> toile_step_report {
@@ -30,23 +71,26 @@ pub(super) fn report_for_c(report: &StepReport) -> toile_step_report {
 
 fn tell(log: &Log, what: &str, report: &StepReport) {
     let level = match report.outcome {
-        Outcome::IterationLimit => TOILE_LOG_WARNING,
+        Outcome::IterationLimit | Outcome::Stalled | Outcome::Falling => TOILE_LOG_WARNING,
         _ => TOILE_LOG_INFO,
     };
     log.say(level, || {
         format!(
-            "{what}: {}, {} substeps, {} Newton iterations, residual {:.3e} N",
+            "{what}: {}, {} substeps, {} Newton iterations, residual {:.3e} N{}{}",
             report.outcome.name(),
             report.substeps,
             report.newton_iterations,
-            report.residual
+            report.residual,
+            if report.reason.is_empty() { "" } else { ": " },
+            report.reason
         )
     });
 }
 
 /// Advances by exactly `dt` [s], in smaller steps inside where needed, or fails and leaves the
-/// simulation as it was. `report` may be NULL. TOILE_E_NO_ADMISSIBLE_STATE: pins or bodies ask for
-/// what cannot be; a shorter step may pass.
+/// simulation as it was. `report` may be NULL. Stopped by the simulation's progress callback it is
+/// TOILE_OK, has advanced by 0 and leaves everything as it was. TOILE_E_NO_ADMISSIBLE_STATE: pins or
+/// bodies ask for what cannot be; a shorter step may pass.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn toile_sim_step(
     sim: *mut toile_sim,
@@ -57,10 +101,10 @@ pub unsafe extern "C" fn toile_sim_step(
         SIMS.get(sim.addr())?;
         let dt = input::positive(dt, "dt")?;
         desc::check_target(report, true)?;
-        let result = write(sim, |sim, log| {
-            let result = sim.step(dt)?;
+        let result = write(sim, |sim, host| {
+            let result = sim.step_watched(dt, &mut |progress| host.watcher.go_on(progress))?;
             if result.outcome != Outcome::Converged {
-                tell(log, "step", &result);
+                tell(&host.log, "step", &result);
             }
             Ok(result)
         })?;
@@ -69,8 +113,9 @@ pub unsafe extern "C" fn toile_sim_step(
 }
 
 /// Sews the garment and lets it come to rest. `desc` NULL takes the defaults; `report` may be NULL.
-/// Stopped by the iteration limit or by the progress callback it is TOILE_OK too, with the outcome
-/// in the report, and may be called again to go on.
+/// Stopped by the iteration limit, by the progress callback, in a dead end, or because nothing holds
+/// the garment, it is TOILE_OK too, with the outcome in the report, and may be called again to go
+/// on.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn toile_sim_drape(
     sim: *mut toile_sim,
@@ -85,27 +130,14 @@ pub unsafe extern "C" fn toile_sim_drape(
             max_steps: desc.max_steps,
         };
         desc::check_target(report, true)?;
-        let result = write(sim, |sim, log| {
-            let result = sim.drape(&options, &mut |progress| go_on(&desc, progress))?;
-            tell(log, "drape", &result);
+        let watcher = Watcher::new(desc.progress, desc.progress_user);
+        let result = write(sim, |sim, host| {
+            let result = sim.drape(&options, &mut |progress| watcher.go_on(progress))?;
+            tell(&host.log, "drape", &result);
             Ok(result)
         })?;
         desc::write(report, &report_for_c(&result))
     })
-}
-
-fn go_on(desc: &toile_drape_desc, progress: &Progress) -> bool {
-    let Some(callback) = desc.progress else {
-        return true;
-    };
-    let stage = c_text(progress.stage);
-    let progress = toile_progress {
-        struct_size: size_of::<toile_progress>(),
-        fraction: progress.fraction,
-        stage: stage.as_ptr(),
-        residual: progress.residual,
-    };
-    callback(desc.progress_user, &raw const progress) == 0
 }
 
 /// The report of the present state without advancing it: counts 0; the outcome is converged if it is

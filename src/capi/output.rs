@@ -1,6 +1,9 @@
 //! What goes out: the two-call idiom for arrays and text, single values.
 
 use super::desc;
+use super::garment;
+use super::handle::Table;
+use super::input;
 use super::types::toile_view_f64;
 use crate::error::{Error, Result, Status};
 use crate::math::{Vec2, Vec3};
@@ -86,6 +89,22 @@ pub(super) unsafe fn view3(points: &[Vec3], epoch: u64, out: *mut toile_view_f64
     };
     // SAFETY: handed on.
     unsafe { desc::write(out, &view) }
+}
+
+/// Writes how many there are of something.
+pub(super) unsafe fn count<T>(
+    table: &Table<T>,
+    handle: usize,
+    out: *mut u32,
+    what: &str,
+    count: impl FnOnce(&T) -> usize,
+) -> Result<()> {
+    let object = table.get(handle)?;
+    input::target(out, "out_count")?;
+    let count = object.read(|o| garment::index(count(o), what))?;
+    // SAFETY: checked above.
+    unsafe { put(out, count) };
+    Ok(())
 }
 
 /// Writes one value.

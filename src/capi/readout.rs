@@ -30,11 +30,9 @@ pub unsafe extern "C" fn toile_sim_vertex_count(
     out_count: *mut u32,
 ) -> toile_status {
     entry!({
-        let object = SIMS.get(sim.addr())?;
-        input::target(out_count, "out_count")?;
-        let count = object.read(|o| Ok(o.sim.positions().len() as u32))?;
-        output::put(out_count, count);
-        Ok(())
+        output::count(&SIMS, sim.addr(), out_count, "vertices", |o| {
+            o.sim.positions().len()
+        })
     })
 }
 
@@ -45,11 +43,9 @@ pub unsafe extern "C" fn toile_sim_triangle_count(
     out_count: *mut u32,
 ) -> toile_status {
     entry!({
-        let object = SIMS.get(sim.addr())?;
-        input::target(out_count, "out_count")?;
-        let count = object.read(|o| Ok(o.sim.triangles().len() as u32))?;
-        output::put(out_count, count);
-        Ok(())
+        output::count(&SIMS, sim.addr(), out_count, "triangles", |o| {
+            o.sim.triangles().len()
+        })
     })
 }
 
@@ -60,11 +56,9 @@ pub unsafe extern "C" fn toile_sim_body_count(
     out_count: *mut u32,
 ) -> toile_status {
     entry!({
-        let object = SIMS.get(sim.addr())?;
-        input::target(out_count, "out_count")?;
-        let count = object.read(|o| Ok(o.sim.body_count() as u32))?;
-        output::put(out_count, count);
-        Ok(())
+        output::count(&SIMS, sim.addr(), out_count, "bodies", |o| {
+            o.sim.body_count()
+        })
     })
 }
 
@@ -157,7 +151,8 @@ pub unsafe extern "C" fn toile_sim_vertex_active(
 ) -> toile_status {
     entry!({
         read(sim, |sim| {
-            output::copy(&vec![1; sim.positions().len()], out, capacity, needed)
+            let active: Vec<u8> = sim.active_vertices().into_iter().map(u8::from).collect();
+            output::copy(&active, out, capacity, needed)
         })
     })
 }
@@ -205,7 +200,7 @@ pub unsafe extern "C" fn toile_sim_velocities_view(
 }
 
 /// World positions of the yarns' nodes [m], shape [node_count, 3]; sizes as in toile_sim_positions.
-/// This version has no yarns: always empty.
+/// Empty in a garment of triangles alone.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn toile_sim_yarn_nodes(
     sim: *const toile_sim,
@@ -213,7 +208,11 @@ pub unsafe extern "C" fn toile_sim_yarn_nodes(
     capacity: usize,
     needed: *mut usize,
 ) -> toile_status {
-    entry!({ read(sim, |_| output::copy(&[], out, capacity, needed)) })
+    entry!({
+        read(sim, |sim| {
+            output::copy(flat3(sim.yarn_nodes()), out, capacity, needed)
+        })
+    })
 }
 
 /// Where the nodes of each yarn begin in toile_sim_yarn_indices, shape [yarn_count + 1]; the last
@@ -225,7 +224,12 @@ pub unsafe extern "C" fn toile_sim_yarn_offsets(
     capacity: usize,
     needed: *mut usize,
 ) -> toile_status {
-    entry!({ read(sim, |_| output::copy(&[0], out, capacity, needed)) })
+    entry!({
+        read(sim, |sim| {
+            let starts = sim.yarns().map_or(&[0][..], |yarns| &yarns.starts);
+            output::copy(starts, out, capacity, needed)
+        })
+    })
 }
 
 /// Nodes of the yarns, yarn after yarn; sizes as in toile_sim_positions.
@@ -236,7 +240,78 @@ pub unsafe extern "C" fn toile_sim_yarn_indices(
     capacity: usize,
     needed: *mut usize,
 ) -> toile_status {
-    entry!({ read(sim, |_| output::copy(&[], out, capacity, needed)) })
+    entry!({
+        read(sim, |sim| {
+            let passages = sim.yarns().map_or(&[][..], |yarns| &yarns.incidences);
+            let nodes: Vec<u32> = passages.iter().map(|p| p.node).collect();
+            output::copy(&nodes, out, capacity, needed)
+        })
+    })
+}
+
+/// Arc length at rest of each yarn at its nodes [m], in the order of toile_sim_yarn_indices; it
+/// changes where yarns slide. Sizes as in toile_sim_positions.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_yarn_coordinates(
+    sim: *const toile_sim,
+    out: *mut f64,
+    capacity: usize,
+    needed: *mut usize,
+) -> toile_status {
+    entry!({
+        read(sim, |sim| {
+            output::copy(sim.yarn_coordinates(), out, capacity, needed)
+        })
+    })
+}
+
+/// Tension of each yarn between a node and the next along it [N], negative where it is compressed,
+/// in the order of toile_sim_yarn_indices with 0 at the last node of a yarn. Sizes as in
+/// toile_sim_positions.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_yarn_tensions(
+    sim: *const toile_sim,
+    out: *mut f64,
+    capacity: usize,
+    needed: *mut usize,
+) -> toile_status {
+    entry!({
+        read(sim, |sim| {
+            output::copy(&sim.yarn_tensions(), out, capacity, needed)
+        })
+    })
+}
+
+/// Largest normal force between two yarns at each node [N], shape [node_count], of the last step or
+/// drape. Sizes as in toile_sim_positions.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_yarn_compressions(
+    sim: *const toile_sim,
+    out: *mut f64,
+    capacity: usize,
+    needed: *mut usize,
+) -> toile_status {
+    entry!({
+        read(sim, |sim| {
+            output::copy(&sim.yarn_compressions(), out, capacity, needed)
+        })
+    })
+}
+
+/// How far each yarn has slid through its nodes since it was laid [m], in the order of
+/// toile_sim_yarn_indices. Sizes as in toile_sim_positions.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_yarn_slips(
+    sim: *const toile_sim,
+    out: *mut f64,
+    capacity: usize,
+    needed: *mut usize,
+) -> toile_status {
+    entry!({
+        read(sim, |sim| {
+            output::copy(&sim.yarn_slips(), out, capacity, needed)
+        })
+    })
 }
 
 /// Vertex of a panel nearest to a point of it, in flat coordinates [m].
@@ -355,7 +430,7 @@ pub unsafe extern "C" fn toile_sim_info(
             struct_size: size_of::<toile_system_info>(),
             vertices: info.vertices as u64,
             triangles: info.triangles as u64,
-            yarn_nodes: 0,
+            yarn_nodes: info.yarn_nodes as u64,
             unknowns: info.unknowns as u64,
             bytes: info.bytes as u64,
             factor_bytes: info.factor_bytes as u64,

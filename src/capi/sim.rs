@@ -1,5 +1,6 @@
 //! Simulations: made, put into a world, edited, saved, restored.
 
+use super::array::Lent;
 use super::body::BODIES;
 use super::desc;
 use super::garment::{self, GARMENTS};
@@ -7,11 +8,11 @@ use super::guard::{entry, guard};
 use super::handle::Table;
 use super::input::{self, LARGEST_COUNT};
 use super::log::{Log, TOILE_LOG_ERROR, TOILE_LOG_INFO, TOILE_LOG_WARNING};
+use super::motion::Watcher;
 use super::output;
 use super::status::toile_status;
 use super::types::{toile_body, toile_contact_desc, toile_garment, toile_sim, toile_sim_desc};
 use crate::error::{Error, Result};
-use crate::pattern::Garment;
 use crate::sim::{ContactSettings, Settings, Sim, SimOptions};
 use crate::sim_scene;
 use std::ffi::c_char;
@@ -20,9 +21,25 @@ use std::ptr;
 /// A simulation and what the boundary keeps beside it.
 pub(super) struct SimObject {
     pub(super) sim: Sim,
-    log: Log,
-    /// Calls that failed, left the state as it was, but elsewhere in memory.
+    host: Host,
+    /// Arrays that hosts hold.
+    pub(super) lent: Lent,
+    /// Calls that left the state as it was, but elsewhere in memory.
     moved: u64,
+}
+
+/// The host's callbacks.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Host {
+    pub(super) log: Log,
+    /// Of steps; a drape brings its own.
+    pub(super) watcher: Watcher,
+}
+
+impl Drop for SimObject {
+    fn drop(&mut self) {
+        self.lent.settle(&mut self.sim);
+    }
 }
 
 impl SimObject {
@@ -41,18 +58,20 @@ pub(super) fn read<R>(sim: *const toile_sim, f: impl FnOnce(&Sim) -> Result<R>) 
 /// Runs a call that may change the simulation; its failure is logged.
 pub(super) fn write<R>(
     sim: *mut toile_sim,
-    f: impl FnOnce(&mut Sim, &Log) -> Result<R>,
+    f: impl FnOnce(&mut Sim, &Host) -> Result<R>,
 ) -> Result<R> {
     SIMS.get(sim.addr())?.write(|object| {
-        let log = object.log;
+        let host = object.host;
         let place = |sim: &Sim| (sim.positions().as_ptr(), sim.velocities().as_ptr());
-        let before = place(&object.sim);
-        f(&mut object.sim, &log).inspect_err(|error| {
-            if place(&object.sim) != before {
-                object.moved += 1;
-            }
-            log.say(TOILE_LOG_ERROR, || error.message.clone());
-        })
+        let before = (place(&object.sim), object.sim.epoch());
+        object.lent.settle(&mut object.sim);
+        let result = f(&mut object.sim, &host).inspect_err(|error| {
+            host.log.say(TOILE_LOG_ERROR, || error.message.clone());
+        });
+        if object.sim.epoch() == before.1 && place(&object.sim) != before.0 {
+            object.moved += 1;
+        }
+        result
     })
 }
 
@@ -61,26 +80,8 @@ fn vertex_count(sim: *const toile_sim) -> Result<usize> {
     read(sim, |sim| Ok(sim.positions().len()))
 }
 
-fn refuse_regions(garment: &Garment) -> Result<()> {
-    match garment.blend_regions.first() {
-        None => Ok(()),
-        Some(region) => Err(no_yarns(garment, region.panel)),
-    }
-}
-
-fn no_yarns(garment: &Garment, panel: u32) -> Error {
-    let name = garment
-        .panels
-        .get(panel as usize)
-        .map_or("", |p| p.name.as_str());
-    Error::unsupported(format!(
-        "panel {panel} '{name}' asks for a blend region; this version simulates triangles only: \
-         clear the region to simulate the garment without yarns"
-    ))
-}
-
-unsafe fn give(sim: Sim, log: Log, out: *mut *mut toile_sim) -> Result<()> {
-    log.say(TOILE_LOG_INFO, || {
+unsafe fn give(sim: Sim, host: Host, out: *mut *mut toile_sim) -> Result<()> {
+    host.log.say(TOILE_LOG_INFO, || {
         let info = sim.info();
         format!(
             "{} vertices, {} triangles, {} unknowns, smallest angle {:.1} degrees, {}",
@@ -92,9 +93,15 @@ unsafe fn give(sim: Sim, log: Log, out: *mut *mut toile_sim) -> Result<()> {
         )
     });
     for note in sim.info().notes {
-        log.say(TOILE_LOG_WARNING, || note.clone());
+        host.log.say(TOILE_LOG_WARNING, || note.clone());
     }
-    let handle = ptr::without_provenance_mut(SIMS.insert(SimObject { sim, log, moved: 0 })?);
+    let object = SimObject {
+        sim,
+        host,
+        lent: Lent::default(),
+        moved: 0,
+    };
+    let handle = ptr::without_provenance_mut(SIMS.insert(object)?);
     // SAFETY: checked by the caller.
     unsafe { output::put(out, handle) };
     Ok(())
@@ -126,12 +133,12 @@ pub unsafe extern "C" fn toile_sim_create(
             pressure: input::finite(desc.pressure, "pressure")?,
             settings,
         };
-        let log = Log::new(desc.log, desc.log_user);
-        let sim = garment.read(|object| {
-            refuse_regions(&object.garment)?;
-            Sim::new(&object.garment, &options)
-        })?;
-        give(sim, log, out)
+        let host = Host {
+            log: Log::new(desc.log, desc.log_user),
+            watcher: Watcher::new(desc.progress, desc.progress_user),
+        };
+        let sim = garment.read(|object| Sim::new(&object.garment, &options))?;
+        give(sim, host, out)
     })
 }
 
@@ -151,8 +158,14 @@ pub unsafe extern "C" fn toile_sim_from_scene(
         let text = input::text(utf8, length, "utf8")?;
         let folder = input::optional_folder(base_dir)?;
         let (sim, _) = sim_scene::sim_from_json(text, folder.as_deref())?;
-        refuse_regions(sim.garment())?;
-        give(sim, Log::none(), out)
+        give(
+            sim,
+            Host {
+                log: Log::none(),
+                watcher: Watcher::none(),
+            },
+            out,
+        )
     })
 }
 
@@ -274,8 +287,8 @@ pub unsafe extern "C" fn toile_sim_unpin(
     })
 }
 
-/// Holds nodes of yarns, as toile_sim_pin holds vertices. TOILE_E_ARGUMENT names a node that does
-/// not exist.
+/// Holds nodes of yarns, as toile_sim_pin holds vertices; yarns do not slide where they are held.
+/// TOILE_E_ARGUMENT names a node that does not exist.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn toile_sim_pin_yarn_nodes(
     sim: *mut toile_sim,
@@ -285,23 +298,39 @@ pub unsafe extern "C" fn toile_sim_pin_yarn_nodes(
 ) -> toile_status {
     entry!({
         SIMS.get(sim.addr())?;
-        let nodes = input::array(nodes, count, LARGEST_COUNT, "nodes")?;
-        if !targets.is_null() {
-            input::points::<3>(targets, count, LARGEST_COUNT, "targets")?;
-        }
-        // held alone like any call that changes; there is no node that could be held
-        write(sim, |_, _| match nodes.first() {
-            None => Ok(()),
-            Some(node) => Err(Error::argument(format!(
-                "yarn node {node} does not exist: the simulation has 0"
-            ))),
-        })
+        let nodes = input::array(nodes, count, LARGEST_COUNT, "nodes")?.to_vec();
+        let targets = if targets.is_null() {
+            None
+        } else {
+            Some(input::points::<3>(
+                targets,
+                count,
+                LARGEST_COUNT,
+                "targets",
+            )?)
+        };
+        write(sim, |sim, _| sim.pin_yarn_nodes(&nodes, targets.as_deref()))
+    })
+}
+
+/// Lets nodes of yarns go. TOILE_E_ARGUMENT names one that is not held.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_unpin_yarn_nodes(
+    sim: *mut toile_sim,
+    nodes: *const u32,
+    count: usize,
+) -> toile_status {
+    entry!({
+        SIMS.get(sim.addr())?;
+        let nodes = input::array(nodes, count, LARGEST_COUNT, "nodes")?.to_vec();
+        write(sim, |sim, _| sim.unpin_yarn_nodes(&nodes))
     })
 }
 
 /// Moves the region in which every yarn is simulated, with the state carried over: a polygon of a
 /// panel in flat coordinates [m], shape [count, 2], and `rings` hybrid rings around it. A count of 0
-/// takes the region away. TOILE_E_UNSUPPORTED: this version simulates triangles only.
+/// takes the region away. TOILE_E_UNSUPPORTED: this version takes regions only when the simulation is
+/// made; a count of 0 on a panel without yarns is fine.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn toile_sim_set_blend_region(
     sim: *mut toile_sim,
@@ -315,17 +344,22 @@ pub unsafe extern "C" fn toile_sim_set_blend_region(
         let uv = input::points::<2>(uv, count, 1 << 20, "uv")?;
         write(sim, |sim, _| {
             let garment = sim.garment();
-            if panel as usize >= garment.panels.len() {
+            let Some(name) = garment.panels.get(panel as usize).map(|p| &p.name) else {
                 return Err(Error::argument(format!(
                     "panel {panel} does not exist: the garment has {}",
                     garment.panels.len()
                 )));
-            }
-            if uv.is_empty() {
+            };
+            if uv.is_empty() && !garment.blend_regions.iter().any(|r| r.panel == panel) {
                 return Ok(());
             }
-            garment::region(garment, panel, &uv, rings)?;
-            Err(no_yarns(garment, panel))
+            if !uv.is_empty() {
+                garment::region(garment, panel, &uv, rings)?;
+            }
+            Err(Error::unsupported(format!(
+                "panel {panel} '{name}': regions of a running simulation do not change in this \
+                 version; set the garment's regions and make the simulation anew"
+            )))
         })
     })
 }

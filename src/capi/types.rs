@@ -26,6 +26,12 @@ pub struct toile_sim {
     _private: [u8; 0],
 }
 
+/// An array that stays as it was.
+#[derive(Debug)]
+pub struct toile_array {
+    _private: [u8; 0],
+}
+
 /// A straight edge.
 pub const TOILE_EDGE_LINE: u32 = 0;
 /// A quadratic Bezier curve; controls are the control point u, v [m] and two ignored numbers.
@@ -44,6 +50,12 @@ pub const TOILE_OUTCOME_SUBSTEPPED: u32 = 1;
 pub const TOILE_OUTCOME_ITERATION_LIMIT: u32 = 2;
 /// The host asked to stop; the state is admissible.
 pub const TOILE_OUTCOME_CANCELLED: u32 = 3;
+/// A drape ended where no step, however short, leads lower; the state is admissible, the residual is
+/// in the report, the reason in the log.
+pub const TOILE_OUTCOME_STALLED: u32 = 4;
+/// Nothing holds a part of the garment and nothing lies on its way: a drape of it would never end.
+/// The state is that at which this was seen; the log names the part.
+pub const TOILE_OUTCOME_FALLING: u32 = 5;
 
 /// How a garment begins.
 #[repr(C)]
@@ -163,6 +175,11 @@ pub struct toile_sim_desc {
     pub log: toile_log_fn,
     /// Handed to the log callback.
     pub log_user: *mut c_void,
+    /// Told before every substep how far a step has come (its stage is "step"), and asked whether to
+    /// go on; NULL for none. A step that is stopped leaves the simulation as it was before it.
+    pub progress: toile_progress_fn,
+    /// Handed to the progress callback.
+    pub progress_user: *mut c_void,
 }
 
 /// How the cloth meets one body.
@@ -187,7 +204,8 @@ pub struct toile_progress {
     pub struct_size: usize,
     /// Estimate of the part done, 0 to 1, never decreasing.
     pub fraction: f64,
-    /// Name of the stage, UTF-8, valid during the callback: "sew", "settle", "unfold", "rest".
+    /// Name of the stage, UTF-8, valid during the callback: "sew", "settle", "unfold", "rest" of a
+    /// drape, "step" of a step.
     pub stage: *const c_char,
     /// Largest force on a free vertex now [N].
     pub residual: f64,
@@ -344,7 +362,8 @@ versioned! {
     }
     toile_sim_desc {
         gravity: [0.0, -9.81, 0.0], wind: [0.0; 3], pressure: 0.0, threads: 1, reserved: 0,
-        max_vertices: 2_000_000, log: None, log_user: ptr::null_mut(),
+        max_vertices: 2_000_000, log: None, log_user: ptr::null_mut(), progress: None,
+        progress_user: ptr::null_mut(),
     }
     toile_contact_desc { friction: 0.3, thickness: 3e-3, stiffness: 1e7 }
     toile_progress { fraction: 0.0, stage: ptr::null(), residual: 0.0 }

@@ -10,11 +10,12 @@
     reason = "FMI 2.0 says what pointers must satisfy; counts, NULL and alignment are checked"
 )]
 
-use super::cosim3::{self, Instance3, State3, c_text};
-use super::host;
-use super::instance::Instance;
+use super::exchange::{
+    self, Call, Instance as Instance2, State as State2, c_text, refused, transitions,
+};
+use super::host::{self, Asked};
 use super::log::{Log, Sink, Status};
-use super::pointers::{input, output, text, texts};
+use super::pointers::{input, output, text};
 use super::uri;
 use super::variables::Kind;
 use crate::error::Error;
@@ -49,6 +50,15 @@ const TERMINATED: i32 = 3;
 const EXCHANGE: &str = "this FMU is for co-simulation, not for model exchange";
 const DERIVATIVES: &str = "this FMU provides no derivatives";
 const PENDING: &str = "steps of this FMU end when they return: none is ever pending";
+
+/// A call of FMI 2.
+fn call(c: Instance2, function: &str) -> Call<'_> {
+    Call {
+        token: c.addr(),
+        function,
+        fmi2: true,
+    }
+}
 
 /// `fmi2GetTypesPlatform`
 #[unsafe(no_mangle)]
@@ -99,7 +109,7 @@ pub unsafe extern "C" fn fmi2Instantiate(
     functions: *const Callbacks,
     _visible: i32,
     loggingOn: i32,
-) -> Instance3 {
+) -> Instance2 {
     // SAFETY: one struct of the master, or NULL.
     let callbacks = unsafe { input(functions, usize::from(!functions.is_null()), "functions") };
     let callbacks = callbacks.ok().and_then(|c| c.first());
@@ -121,46 +131,39 @@ pub unsafe extern "C" fn fmi2Instantiate(
         if fmuType != CO_SIMULATION {
             return Err(Error::unsupported(EXCHANGE));
         }
-        Ok((name?, token, uri::path(&location)?))
+        Ok(Asked {
+            name: name?,
+            token,
+            resources: uri::path(&location)?,
+        })
     };
-    let token = match asked() {
-        Ok((name, token, path)) => host::instantiate(&name, &token, &path, log),
-        Err(e) => {
-            log.say(Status::Error, || format!("fmi2Instantiate: {e}"));
-            0
-        }
-    };
+    let token = host::instantiate("fmi2Instantiate", log, asked);
     std::ptr::without_provenance_mut(token)
 }
 
 /// `fmi2FreeInstance`
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2FreeInstance(c: Instance3) {
+pub extern "C" fn fmi2FreeInstance(c: Instance2) {
     host::free(c.addr());
 }
 
 /// `fmi2SetDebugLogging`
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi2SetDebugLogging(
-    c: Instance3,
+    c: Instance2,
     loggingOn: i32,
     nCategories: usize,
     categories: *const *const c_char,
 ) -> i32 {
-    host::with(c.addr(), "fmi2SetDebugLogging", |i| {
-        // SAFETY: the master's list of texts.
-        let categories = unsafe { texts(categories, nCategories, "categories")? };
-        i.log()
-            .set(loggingOn != 0, &categories)
-            .map_err(|c| Error::argument(format!("there is no log category '{c}'")))?;
-        Ok(Status::Ok)
-    }) as i32
+    let call = call(c, "fmi2SetDebugLogging");
+    // SAFETY: the master's list of texts.
+    unsafe { exchange::log_categories(call, loggingOn != 0, nCategories, categories) }
 }
 
 /// `fmi2SetupExperiment`
 #[unsafe(no_mangle)]
 pub extern "C" fn fmi2SetupExperiment(
-    c: Instance3,
+    c: Instance2,
     toleranceDefined: i32,
     tolerance: f64,
     startTime: f64,
@@ -176,16 +179,6 @@ pub extern "C" fn fmi2SetupExperiment(
     }) as i32
 }
 
-macro_rules! transitions {
-    ($($name:ident => $method:ident;)*) => {$(
-        #[doc = concat!("`", stringify!($name), "`")]
-        #[unsafe(no_mangle)]
-        pub extern "C" fn $name(c: Instance3) -> i32 {
-            host::with(c.addr(), stringify!($name), Instance::$method) as i32
-        }
-    )*};
-}
-
 transitions! {
     fmi2EnterInitializationMode => enter_initialization;
     fmi2ExitInitializationMode => exit_initialization;
@@ -194,14 +187,14 @@ transitions! {
 
 /// `fmi2Reset`
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2Reset(c: Instance3) -> i32 {
+pub extern "C" fn fmi2Reset(c: Instance2) -> i32 {
     host::reset(c.addr(), "fmi2Reset") as i32
 }
 
 /// `fmi2DoStep`
 #[unsafe(no_mangle)]
 pub extern "C" fn fmi2DoStep(
-    c: Instance3,
+    c: Instance2,
     currentCommunicationPoint: f64,
     communicationStepSize: f64,
     _noSetFMUStatePriorToCurrentPoint: i32,
@@ -211,149 +204,91 @@ pub extern "C" fn fmi2DoStep(
     }) as i32
 }
 
-macro_rules! numbers {
-    ($($get:ident $set:ident $type:ty, $kind:ident;)*) => {$(
+macro_rules! values {
+    ($($get:ident $set:ident $type:ty, $kind:ident, $from:expr, $into:expr;)*) => {$(
         #[doc = concat!("`", stringify!($get), "`")]
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $get(
-            c: Instance3, vr: *const u32, nvr: usize, value: *mut $type,
+            c: Instance2, vr: *const u32, nvr: usize, value: *mut $type,
         ) -> i32 {
-            host::with(c.addr(), stringify!($get), |i| {
-                // SAFETY: the master's list of references.
-                let references = unsafe { input(vr, nvr, "vr")? };
-                let read = i.read(Kind::$kind, references, nvr, true)?;
-                // SAFETY: room for `nvr` values, which is as many as were read.
-                unsafe { output(value, read.into_iter().map(|v| v as $type), "value")? };
-                Ok(Status::Ok)
-            }) as i32
+            let call = call(c, stringify!($get));
+            // SAFETY: the master's lists.
+            unsafe { exchange::get(call, Kind::$kind, (vr, nvr), (value, nvr), $from) }
         }
 
         #[doc = concat!("`", stringify!($set), "`")]
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $set(
-            c: Instance3, vr: *const u32, nvr: usize, value: *const $type,
+            c: Instance2, vr: *const u32, nvr: usize, value: *const $type,
         ) -> i32 {
-            host::with(c.addr(), stringify!($set), |i| {
-                // SAFETY: the master's lists.
-                let lists = unsafe { (input(vr, nvr, "vr")?, input(value, nvr, "value")?) };
-                let (references, values) = lists;
-                let values: Vec<f64> = values.iter().map(|&v| f64::from(v)).collect();
-                i.write(Kind::$kind, references, &values, true)
-            }) as i32
+            let call = call(c, stringify!($set));
+            // SAFETY: the master's lists.
+            unsafe { exchange::set(call, Kind::$kind, (vr, nvr), (value, nvr), $into) }
         }
     )*};
 }
 
-numbers! {
-    fmi2GetReal fmi2SetReal f64, Float64;
-    fmi2GetInteger fmi2SetInteger i32, Int32;
-}
-
-/// `fmi2GetBoolean`
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetBoolean(
-    c: Instance3,
-    vr: *const u32,
-    nvr: usize,
-    value: *mut i32,
-) -> i32 {
-    host::with(c.addr(), "fmi2GetBoolean", |i| {
-        // SAFETY: the master's list of references.
-        let references = unsafe { input(vr, nvr, "vr")? };
-        let read = i.read(Kind::Boolean, references, nvr, true)?;
-        // SAFETY: room for `nvr` values, which is as many as were read.
-        unsafe { output(value, read.into_iter().map(|v| i32::from(v > 0.5)), "value")? };
-        Ok(Status::Ok)
-    }) as i32
-}
-
-/// `fmi2SetBoolean`
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetBoolean(
-    c: Instance3,
-    vr: *const u32,
-    nvr: usize,
-    value: *const i32,
-) -> i32 {
-    host::with(c.addr(), "fmi2SetBoolean", |i| {
-        // SAFETY: the master's lists.
-        let (references, values) = unsafe { (input(vr, nvr, "vr")?, input(value, nvr, "value")?) };
-        let values: Vec<f64> = values
-            .iter()
-            .map(|&v| f64::from(u8::from(v != 0)))
-            .collect();
-        i.write(Kind::Boolean, references, &values, true)
-    }) as i32
+values! {
+    fmi2GetReal fmi2SetReal f64, Float64, |v| v, |v| v;
+    fmi2GetInteger fmi2SetInteger i32, Int32, |v| v as i32, f64::from;
+    fmi2GetBoolean fmi2SetBoolean i32, Boolean, |v| i32::from(v > 0.5), |v| f64::from(u8::from(v != 0));
 }
 
 /// `fmi2GetFMUstate`
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2GetFMUstate(c: Instance3, FMUstate: *mut State3) -> i32 {
-    cosim3::with_slot(c, "fmi2GetFMUstate", FMUstate, host::get_state)
+pub extern "C" fn fmi2GetFMUstate(c: Instance2, FMUstate: *mut State2) -> i32 {
+    exchange::get_state(call(c, "fmi2GetFMUstate"), FMUstate)
 }
 
 /// `fmi2SetFMUstate`
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2SetFMUstate(c: Instance3, FMUstate: State3) -> i32 {
+pub extern "C" fn fmi2SetFMUstate(c: Instance2, FMUstate: State2) -> i32 {
     host::set_state(c.addr(), "fmi2SetFMUstate", FMUstate.addr()) as i32
 }
 
 /// `fmi2FreeFMUstate`
 #[unsafe(no_mangle)]
-pub extern "C" fn fmi2FreeFMUstate(c: Instance3, FMUstate: *mut State3) -> i32 {
-    if FMUstate.is_null() {
-        return Status::Ok as i32;
-    }
-    cosim3::with_slot(c, "fmi2FreeFMUstate", FMUstate, host::free_state)
+pub extern "C" fn fmi2FreeFMUstate(c: Instance2, FMUstate: *mut State2) -> i32 {
+    exchange::free_state(call(c, "fmi2FreeFMUstate"), FMUstate)
 }
 
 /// `fmi2SerializedFMUstateSize`
 #[unsafe(no_mangle)]
 pub extern "C" fn fmi2SerializedFMUstateSize(
-    c: Instance3,
-    FMUstate: State3,
+    c: Instance2,
+    FMUstate: State2,
     size: *mut usize,
 ) -> i32 {
-    cosim3::state_size(c, "fmi2SerializedFMUstateSize", FMUstate, size)
+    exchange::state_size(call(c, "fmi2SerializedFMUstateSize"), FMUstate, size)
 }
 
 /// `fmi2SerializeFMUstate`
 #[unsafe(no_mangle)]
 pub extern "C" fn fmi2SerializeFMUstate(
-    c: Instance3,
-    FMUstate: State3,
+    c: Instance2,
+    FMUstate: State2,
     serializedState: *mut c_char,
     size: usize,
 ) -> i32 {
-    cosim3::serialize(
-        c,
-        "fmi2SerializeFMUstate",
-        FMUstate,
-        serializedState.cast(),
-        size,
-    )
+    let call = call(c, "fmi2SerializeFMUstate");
+    exchange::serialize(call, FMUstate, serializedState.cast(), size)
 }
 
 /// `fmi2DeSerializeFMUstate`
 #[unsafe(no_mangle)]
 pub extern "C" fn fmi2DeSerializeFMUstate(
-    c: Instance3,
+    c: Instance2,
     serializedState: *const c_char,
     size: usize,
-    FMUstate: *mut State3,
+    FMUstate: *mut State2,
 ) -> i32 {
-    cosim3::deserialize(
-        c,
-        "fmi2DeSerializeFMUstate",
-        serializedState.cast(),
-        size,
-        FMUstate,
-    )
+    let call = call(c, "fmi2DeSerializeFMUstate");
+    exchange::deserialize(call, serializedState.cast(), size, FMUstate)
 }
 
 /// `fmi2GetRealStatus`: the time that was reached.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetRealStatus(c: Instance3, s: i32, value: *mut f64) -> i32 {
+pub unsafe extern "C" fn fmi2GetRealStatus(c: Instance2, s: i32, value: *mut f64) -> i32 {
     host::with(c.addr(), "fmi2GetRealStatus", |i| {
         if s != LAST_SUCCESSFUL_TIME {
             return Err(Error::argument(format!("status kind {s} is no real number")).into());
@@ -366,7 +301,7 @@ pub unsafe extern "C" fn fmi2GetRealStatus(c: Instance3, s: i32, value: *mut f64
 
 /// `fmi2GetBooleanStatus`: whether the FMU wants the run to end, which it never does, or has ended it.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetBooleanStatus(c: Instance3, s: i32, value: *mut i32) -> i32 {
+pub unsafe extern "C" fn fmi2GetBooleanStatus(c: Instance2, s: i32, value: *mut i32) -> i32 {
     host::with(c.addr(), "fmi2GetBooleanStatus", |i| {
         if s != TERMINATED {
             return Err(Error::argument(format!("status kind {s} is no boolean")).into());
@@ -381,16 +316,6 @@ pub unsafe extern "C" fn fmi2GetBooleanStatus(c: Instance3, s: i32, value: *mut 
         };
         Ok(Status::Ok)
     }) as i32
-}
-
-macro_rules! refused {
-    ($($name:ident($($arg:ident: $type:ty),*) $why:expr;)*) => {$(
-        #[doc = concat!("`", stringify!($name), "`: refused.")]
-        #[unsafe(no_mangle)]
-        pub extern "C" fn $name(c: Instance3 $(, $arg: $type)*) -> i32 {
-            host::unsupported(c.addr(), stringify!($name), $why) as i32
-        }
-    )*};
 }
 
 refused! {
@@ -427,12 +352,8 @@ macro_rules! no_strings {
     ($($name:ident $type:ty;)*) => {$(
         #[doc = concat!("`", stringify!($name), "`: no variable is a text.")]
         #[unsafe(no_mangle)]
-        pub extern "C" fn $name(c: Instance3, _vr: *const u32, nvr: usize, _value: $type) -> i32 {
-            if nvr == 0 && host::exists(c.addr()) {
-                return Status::Ok as i32;
-            }
-            let why = format!("{nvr} variables: no variable is a String");
-            host::unsupported(c.addr(), stringify!($name), &why) as i32
+        pub extern "C" fn $name(c: Instance2, _vr: *const u32, nvr: usize, _value: $type) -> i32 {
+            exchange::none_of(call(c, stringify!($name)), "String", nvr, nvr)
         }
     )*};
 }

@@ -12,27 +12,24 @@
     reason = "FMI 3.0 says what pointers must satisfy; counts, NULL and alignment are checked"
 )]
 
-use super::host;
-use super::instance::Instance;
+use super::exchange::{self, Call, Instance as Instance3, State as State3, c_text, transitions};
+use super::host::{self, Asked};
 use super::log::{Log, Sink, Status};
-use super::pointers::{input, output, put, text, texts};
+use super::pointers::{input, output, put, text};
 use super::variables::Kind;
 use crate::error::Error;
-use std::ffi::{CString, c_char, c_void};
-use std::path::Path;
+use std::ffi::{c_char, c_void};
 
-/// `fmi3Instance`: a token, never dereferenced.
-pub type Instance3 = *mut c_void;
-/// `fmi3FMUState`: a token, never dereferenced.
-pub type State3 = *mut c_void;
 /// `fmi3LogMessageCallback`.
 pub type LogMessage = unsafe extern "C" fn(*mut c_void, i32, *const c_char, *const c_char);
 
-/// Text for C: ends at its first NUL.
-pub(super) fn c_text(text: &str) -> CString {
-    let bytes = text.as_bytes();
-    let end = bytes.iter().position(|&b| b == 0).unwrap_or(bytes.len());
-    CString::new(&bytes[..end]).unwrap_or_default()
+/// A call of FMI 3.
+pub(super) fn call(instance: Instance3, function: &str) -> Call<'_> {
+    Call {
+        token: instance.addr(),
+        function,
+        fmi2: false,
+    }
 }
 
 /// A log that speaks through the master's callback, on the thread of the call that has something to
@@ -71,14 +68,9 @@ pub unsafe extern "C" fn fmi3SetDebugLogging(
     nCategories: usize,
     categories: *const *const c_char,
 ) -> i32 {
-    host::with(instance.addr(), "fmi3SetDebugLogging", |i| {
-        // SAFETY: the master's list of texts.
-        let categories = unsafe { texts(categories, nCategories, "categories")? };
-        i.log()
-            .set(loggingOn != 0, &categories)
-            .map_err(|c| Error::argument(format!("there is no log category '{c}'")))?;
-        Ok(Status::Ok)
-    }) as i32
+    let call = call(instance, "fmi3SetDebugLogging");
+    // SAFETY: the master's list of texts.
+    unsafe { exchange::log_categories(call, loggingOn != 0, nCategories, categories) }
 }
 
 /// `fmi3InstantiateCoSimulation`
@@ -116,17 +108,14 @@ pub unsafe extern "C" fn fmi3InstantiateCoSimulation(
         if path.is_empty() {
             return Err(Error::argument("resourcePath is empty"));
         }
-        Ok((name, token, path))
+        let resources = path.into();
+        Ok(Asked {
+            name,
+            token,
+            resources,
+        })
     };
-    let token = match asked() {
-        Ok((name, token, path)) => host::instantiate(&name, &token, Path::new(&path), log),
-        Err(e) => {
-            log.say(Status::Error, || {
-                format!("fmi3InstantiateCoSimulation: {e}")
-            });
-            0
-        }
-    };
+    let token = host::instantiate("fmi3InstantiateCoSimulation", log, asked);
     std::ptr::without_provenance_mut(token)
 }
 
@@ -154,16 +143,6 @@ pub extern "C" fn fmi3EnterInitializationMode(
         )?;
         i.enter_initialization()
     }) as i32
-}
-
-macro_rules! transitions {
-    ($($name:ident => $method:ident;)*) => {$(
-        #[doc = concat!("`", stringify!($name), "`")]
-        #[unsafe(no_mangle)]
-        pub extern "C" fn $name(instance: Instance3) -> i32 {
-            host::with(instance.addr(), stringify!($name), Instance::$method) as i32
-        }
-    )*};
 }
 
 transitions! {
@@ -205,8 +184,8 @@ pub unsafe extern "C" fn fmi3DoStep(
     }) as i32
 }
 
-macro_rules! numbers {
-    ($($get:ident $set:ident $type:ty, $kind:ident;)*) => {$(
+macro_rules! values {
+    ($($get:ident $set:ident $type:ty, $kind:ident, $from:expr, $into:expr;)*) => {$(
         #[doc = concat!("`", stringify!($get), "`")]
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $get(
@@ -216,16 +195,10 @@ macro_rules! numbers {
             values: *mut $type,
             nValues: usize,
         ) -> i32 {
-            host::with(instance.addr(), stringify!($get), |i| {
-                let (vr, n) = (valueReferences, nValueReferences);
-                // SAFETY: the master's list of references.
-                let references = unsafe { input(vr, n, "valueReferences")? };
-                let read = i.read(Kind::$kind, references, nValues, false)?;
-                let read = read.into_iter().map(|v| v as $type);
-                // SAFETY: room for `nValues`, which is as many as were read.
-                unsafe { output(values, read, "values")? };
-                Ok(Status::Ok)
-            }) as i32
+            let references = (valueReferences, nValueReferences);
+            let call = call(instance, stringify!($get));
+            // SAFETY: the master's lists.
+            unsafe { exchange::get(call, Kind::$kind, references, (values, nValues), $from) }
         }
 
         #[doc = concat!("`", stringify!($set), "`")]
@@ -237,71 +210,20 @@ macro_rules! numbers {
             values: *const $type,
             nValues: usize,
         ) -> i32 {
-            host::with(instance.addr(), stringify!($set), |i| {
-                // SAFETY: the master's lists.
-                let (references, values) = unsafe {
-                    (
-                        input(valueReferences, nValueReferences, "valueReferences")?,
-                        input(values, nValues, "values")?,
-                    )
-                };
-                let values: Vec<f64> = values.iter().map(|&v| v as f64).collect();
-                i.write(Kind::$kind, references, &values, false)
-            }) as i32
+            let references = (valueReferences, nValueReferences);
+            let call = call(instance, stringify!($set));
+            // SAFETY: the master's lists.
+            unsafe { exchange::set(call, Kind::$kind, references, (values, nValues), $into) }
         }
     )*};
 }
 
-numbers! {
-    fmi3GetFloat64 fmi3SetFloat64 f64, Float64;
-    fmi3GetInt32 fmi3SetInt32 i32, Int32;
-    fmi3GetUInt32 fmi3SetUInt32 u32, UInt32;
-    fmi3GetUInt64 fmi3SetUInt64 u64, UInt64;
-}
-
-/// `fmi3GetBoolean`
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3GetBoolean(
-    instance: Instance3,
-    valueReferences: *const u32,
-    nValueReferences: usize,
-    values: *mut u8,
-    nValues: usize,
-) -> i32 {
-    host::with(instance.addr(), "fmi3GetBoolean", |i| {
-        // SAFETY: the master's list of references.
-        let references = unsafe { input(valueReferences, nValueReferences, "valueReferences")? };
-        let read = i.read(Kind::Boolean, references, nValues, false)?;
-        let read = read.into_iter().map(|v| u8::from(v > 0.5));
-        // SAFETY: room for `nValues`, which is as many as were read.
-        unsafe { output(values, read, "values")? };
-        Ok(Status::Ok)
-    }) as i32
-}
-
-/// `fmi3SetBoolean`
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SetBoolean(
-    instance: Instance3,
-    valueReferences: *const u32,
-    nValueReferences: usize,
-    values: *const u8,
-    nValues: usize,
-) -> i32 {
-    host::with(instance.addr(), "fmi3SetBoolean", |i| {
-        // SAFETY: the master's lists.
-        let (references, values) = unsafe {
-            (
-                input(valueReferences, nValueReferences, "valueReferences")?,
-                input(values, nValues, "values")?,
-            )
-        };
-        let values: Vec<f64> = values
-            .iter()
-            .map(|&v| f64::from(u8::from(v != 0)))
-            .collect();
-        i.write(Kind::Boolean, references, &values, false)
-    }) as i32
+values! {
+    fmi3GetFloat64 fmi3SetFloat64 f64, Float64, |v| v, |v| v;
+    fmi3GetInt32 fmi3SetInt32 i32, Int32, |v| v as i32, f64::from;
+    fmi3GetUInt32 fmi3SetUInt32 u32, UInt32, |v| v as u32, f64::from;
+    fmi3GetUInt64 fmi3SetUInt64 u64, UInt64, |v| v as u64, |v| v as f64;
+    fmi3GetBoolean fmi3SetBoolean u8, Boolean, |v| u8::from(v > 0.5), |v| f64::from(u8::from(v != 0));
 }
 
 /// `fmi3GetBinary`
@@ -329,8 +251,8 @@ pub unsafe extern "C" fn fmi3GetBinary(
 
 /// `fmi3GetFMUState`
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3GetFMUState(instance: Instance3, FMUState: *mut State3) -> i32 {
-    with_slot(instance, "fmi3GetFMUState", FMUState, host::get_state)
+pub extern "C" fn fmi3GetFMUState(instance: Instance3, FMUState: *mut State3) -> i32 {
+    exchange::get_state(call(instance, "fmi3GetFMUState"), FMUState)
 }
 
 /// `fmi3SetFMUState`
@@ -341,119 +263,41 @@ pub extern "C" fn fmi3SetFMUState(instance: Instance3, FMUState: State3) -> i32 
 
 /// `fmi3FreeFMUState`
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3FreeFMUState(instance: Instance3, FMUState: *mut State3) -> i32 {
-    if FMUState.is_null() {
-        return Status::Ok as i32;
-    }
-    with_slot(instance, "fmi3FreeFMUState", FMUState, host::free_state)
+pub extern "C" fn fmi3FreeFMUState(instance: Instance3, FMUState: *mut State3) -> i32 {
+    exchange::free_state(call(instance, "fmi3FreeFMUState"), FMUState)
 }
 
 /// `fmi3SerializedFMUStateSize`
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SerializedFMUStateSize(
+pub extern "C" fn fmi3SerializedFMUStateSize(
     instance: Instance3,
     FMUState: State3,
     size: *mut usize,
 ) -> i32 {
-    state_size(instance, "fmi3SerializedFMUStateSize", FMUState, size)
+    let call = call(instance, "fmi3SerializedFMUStateSize");
+    exchange::state_size(call, FMUState, size)
 }
 
 /// `fmi3SerializeFMUState`
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SerializeFMUState(
+pub extern "C" fn fmi3SerializeFMUState(
     instance: Instance3,
     FMUState: State3,
     serializedState: *mut u8,
     size: usize,
 ) -> i32 {
-    serialize(
-        instance,
-        "fmi3SerializeFMUState",
-        FMUState,
-        serializedState,
-        size,
-    )
+    let call = call(instance, "fmi3SerializeFMUState");
+    exchange::serialize(call, FMUState, serializedState, size)
 }
 
 /// `fmi3DeserializeFMUState`
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3DeserializeFMUState(
+pub extern "C" fn fmi3DeserializeFMUState(
     instance: Instance3,
     serializedState: *const u8,
     size: usize,
     FMUState: *mut State3,
 ) -> i32 {
-    deserialize(
-        instance,
-        "fmi3DeserializeFMUState",
-        serializedState,
-        size,
-        FMUState,
-    )
-}
-
-/// Hands a call the token behind the master's pointer to a state, and puts it back.
-pub(super) fn with_slot(
-    instance: Instance3,
-    function: &str,
-    slot: *mut State3,
-    body: impl FnOnce(usize, &str, &mut usize) -> Status,
-) -> i32 {
-    // SAFETY: the master's place for one pointer.
-    let given = match unsafe { input(slot, 1, "FMUState") } {
-        Ok(given) => given[0],
-        Err(e) => return host::unsupported(instance.addr(), function, &e.message) as i32,
-    };
-    let mut token = given.addr();
-    let status = body(instance.addr(), function, &mut token);
-    // SAFETY: the same place, checked above.
-    unsafe { put(slot, std::ptr::without_provenance_mut(token)) };
-    status as i32
-}
-
-pub(super) fn state_size(
-    instance: Instance3,
-    function: &str,
-    state: State3,
-    size: *mut usize,
-) -> i32 {
-    host::state_bytes(instance.addr(), function, state.addr(), |bytes| {
-        // SAFETY: the master's place for one number.
-        unsafe { output(size, std::iter::once(bytes.len()), "size") }
-    }) as i32
-}
-
-pub(super) fn serialize(
-    instance: Instance3,
-    function: &str,
-    state: State3,
-    buffer: *mut u8,
-    size: usize,
-) -> i32 {
-    host::state_bytes(instance.addr(), function, state.addr(), |bytes| {
-        if size != bytes.len() {
-            return Err(Error::argument(format!(
-                "room for {size} bytes, the state has {}",
-                bytes.len()
-            )));
-        }
-        // SAFETY: the master's room for `size` bytes.
-        unsafe { output(buffer, bytes.iter().copied(), "serializedState") }
-    }) as i32
-}
-
-pub(super) fn deserialize(
-    instance: Instance3,
-    function: &str,
-    bytes: *const u8,
-    size: usize,
-    slot: *mut State3,
-) -> i32 {
-    with_slot(instance, function, slot, |token, function, state| {
-        // SAFETY: `size` bytes of the master.
-        match unsafe { input(bytes, size, "serializedState") } {
-            Ok(bytes) => host::deserialize(token, function, bytes, state),
-            Err(e) => host::unsupported(token, function, &e.message),
-        }
-    })
+    let call = call(instance, "fmi3DeserializeFMUState");
+    exchange::deserialize(call, serializedState, size, FMUState)
 }

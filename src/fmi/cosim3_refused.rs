@@ -11,8 +11,8 @@
     reason = "no pointer is looked at, but for the texts that the log takes"
 )]
 
-use super::cosim3::{Instance3, LogMessage, log3};
-use super::host;
+use super::cosim3::{LogMessage, call, log3};
+use super::exchange::{Instance as Instance3, none_of, refused};
 use super::log::Status;
 use std::ffi::{c_char, c_void};
 
@@ -57,16 +57,6 @@ pub extern "C" fn fmi3InstantiateScheduledExecution(
         "fmi3InstantiateScheduledExecution: this FMU is for co-simulation only".into()
     });
     std::ptr::null_mut()
-}
-
-macro_rules! refused {
-    ($($name:ident($($arg:ident: $type:ty),*) $why:expr;)*) => {$(
-        #[doc = concat!("`", stringify!($name), "`: refused.")]
-        #[unsafe(no_mangle)]
-        pub extern "C" fn $name(instance: Instance3 $(, $arg: $type)*) -> i32 {
-            host::unsupported(instance.addr(), stringify!($name), $why) as i32
-        }
-    )*};
 }
 
 refused! {
@@ -139,7 +129,7 @@ macro_rules! no_such_type {
         pub extern "C" fn $get(
             instance: Instance3, _references: *const u32, n: usize, _values: *mut $type, count: usize,
         ) -> i32 {
-            none_of(instance, stringify!($get), $name, n, count)
+            none_of(call(instance, stringify!($get)), $name, n, count)
         }
 
         #[doc = concat!("`", stringify!($set), "`: no variable is of this type.")]
@@ -147,7 +137,7 @@ macro_rules! no_such_type {
         pub extern "C" fn $set(
             instance: Instance3, _references: *const u32, n: usize, _values: *const $type, count: usize,
         ) -> i32 {
-            none_of(instance, stringify!($set), $name, n, count)
+            none_of(call(instance, stringify!($set)), $name, n, count)
         }
     )*};
 }
@@ -172,19 +162,6 @@ pub extern "C" fn fmi3SetBinary(
     _values: *const *const u8,
     count: usize,
 ) -> i32 {
-    none_of(
-        instance,
-        "fmi3SetBinary",
-        "Binary that can be set",
-        n,
-        count,
-    )
-}
-
-fn none_of(instance: Instance3, function: &str, kind: &str, n: usize, count: usize) -> i32 {
-    if n == 0 && count == 0 && host::exists(instance.addr()) {
-        return Status::Ok as i32;
-    }
-    let why = format!("{n} variables and {count} values: no variable is a {kind}");
-    host::unsupported(instance.addr(), function, &why) as i32
+    let call = call(instance, "fmi3SetBinary");
+    none_of(call, "Binary that can be set", n, count)
 }

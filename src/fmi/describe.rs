@@ -22,14 +22,18 @@ pub(super) struct Description<'a> {
 }
 
 /// Stop time where the scene names no duration [s]: short enough to try an FMU out.
-const STOP_TIME: f64 = 0.25;
+const STOP_TIME: f64 = 0.1;
 
 fn truth(yes: bool) -> String {
     yes.to_string()
 }
 
-/// The start value as the type writes it.
+/// The start value as the type writes it, of an array all of them.
 fn start(v: &Variable) -> String {
+    if !v.starts.is_empty() {
+        let each: Vec<String> = v.starts.iter().map(f64::to_string).collect();
+        return each.join(" ");
+    }
     match v.kind {
         Kind::Boolean => truth(v.start > 0.5),
         _ => v.start.to_string(),
@@ -47,11 +51,6 @@ fn bounds(v: &Variable, out: &mut Vec<Attribute<'static>>) {
     out.extend(v.min.map(|min| attribute("min", min)));
     out.extend(v.max.map(|max| attribute("max", max)));
     out.extend(v.nominal.map(|nominal| attribute("nominal", nominal)));
-}
-
-/// Whether it is computed, and so has no start value.
-fn is_computed(v: &Variable) -> bool {
-    matches!(v.causality, Causality::Output | Causality::Local)
 }
 
 /// The attribute `initial`; time and inputs have none.
@@ -293,6 +292,7 @@ fn of_body(quantity: Quantity) -> Option<usize> {
         | Quantity::BodyQuaternion(b, _)
         | Quantity::BodyVelocity(b, _)
         | Quantity::BodyAngularVelocity(b, _)
+        | Quantity::MeshVertices(b)
         | Quantity::BodyForce(b, _)
         | Quantity::BodyTorque(b, _) => Some(b),
         _ => None,
@@ -349,7 +349,7 @@ fn variable2(xml: &mut Xml, reference: usize, v: &Variable) -> Result<()> {
     attributes.extend(initial(v).map(|i| attribute("initial", i)));
     let mut typed = Vec::new();
     bounds(v, &mut typed);
-    if !is_computed(v) && v.causality != Causality::Independent {
+    if v.is_settable() {
         typed.push(attribute("start", start(v)));
     }
     xml.element("ScalarVariable", &attributes, |xml| {

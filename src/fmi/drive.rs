@@ -1,7 +1,7 @@
 //! From the values of inputs to bodies, pins, air and tunables of the simulation.
 
 use super::model::Model;
-use super::variables::Quantity;
+use super::variables::{Quantity, Values};
 use crate::error::{Error, Result};
 use crate::math::{Rotation, Vec3};
 use crate::scene::motion;
@@ -10,15 +10,17 @@ use crate::solve::settings::Settings;
 
 /// What the inputs say of one body.
 #[derive(Clone, Copy, Debug, Default)]
-struct BodyInput {
+struct BodyInput<'a> {
     driven: bool,
+    /// Vertices of a deforming mesh that follows the inputs, row by row.
+    vertices: Option<&'a [f64]>,
     position: [f64; 3],
     quaternion: [f64; 4],
     velocity: [f64; 3],
     angular_velocity: [f64; 3],
 }
 
-impl BodyInput {
+impl BodyInput<'_> {
     /// Position and quaternion of the body a time `h` [s] after it was at the inputs' pose. Without
     /// turning the quaternion is handed on as it came, so that other hosts get the same bits.
     fn pose(&self, body: usize, h: f64) -> Result<([f64; 3], [f64; 4])> {
@@ -48,20 +50,26 @@ struct PinInput {
 }
 
 /// Inputs by body and pin.
-struct Inputs {
-    bodies: Vec<BodyInput>,
+struct Inputs<'a> {
+    bodies: Vec<BodyInput<'a>>,
     pins: Vec<PinInput>,
 }
 
-fn inputs(model: &Model, values: &[f64]) -> Inputs {
+fn inputs<'a>(model: &Model, values: &'a Values) -> Inputs<'a> {
     let mut bodies = vec![BodyInput::default(); model.scene.bodies.len()];
     let pin = PinInput {
         held: true,
         displacement: [0.0; 3],
     };
     let mut pins = vec![pin; model.scene.pins.len()];
-    for (variable, &value) in model.variables.iter().zip(values) {
+    let mut meshes = vec![false; bodies.len()];
+    for (reference, variable) in (0..).zip(&model.variables) {
+        let value = values.scalars[reference as usize];
         match variable.quantity {
+            Quantity::MeshDriven(b) => meshes[b] = value > 0.5,
+            Quantity::MeshVertices(b) => {
+                bodies[b].vertices = meshes[b].then_some(values.of(reference));
+            }
             Quantity::Driven(b) => bodies[b].driven = value > 0.5,
             Quantity::BodyPosition(b, k) => bodies[b].position[k] = value,
             Quantity::BodyQuaternion(b, k) => bodies[b].quaternion[k] = value,
@@ -108,12 +116,15 @@ pub(super) fn settings(model: &Model, values: &[f64], sim: &mut Sim) -> Result<(
 }
 
 /// Puts bodies and pins where a run begins.
-pub(super) fn place(model: &Model, values: &[f64], sim: &mut Sim) -> Result<()> {
+pub(super) fn place(model: &Model, values: &Values, sim: &mut Sim) -> Result<()> {
     let inputs = inputs(model, values);
     for (b, input) in inputs.bodies.iter().enumerate() {
         if input.driven {
             let (position, quaternion) = input.pose(b, 0.0)?;
             sim.place_body(b as u32, position, quaternion)?;
+        }
+        if let Some(vertices) = input.vertices {
+            sim.place_body_vertices(b as u32, vertices.as_chunks().0)?;
         }
     }
     let time = sim.time();
@@ -121,7 +132,7 @@ pub(super) fn place(model: &Model, values: &[f64], sim: &mut Sim) -> Result<()> 
 }
 
 /// Says where bodies and pins are at the end of a step of `h` [s].
-pub(super) fn step(model: &Model, values: &[f64], sim: &mut Sim, h: f64) -> Result<()> {
+pub(super) fn step(model: &Model, values: &Values, sim: &mut Sim, h: f64) -> Result<()> {
     let inputs = inputs(model, values);
     let time = sim.time() + h;
     for (b, (input, body)) in inputs.bodies.iter().zip(&model.scene.bodies).enumerate() {
@@ -133,7 +144,9 @@ pub(super) fn step(model: &Model, values: &[f64], sim: &mut Sim, h: f64) -> Resu
             let pose = body.motion.pose(time);
             sim.set_body_pose(index, pose.position.into(), xyzw(&pose.rotation))?;
         }
-        if body.motion.frames.len() > 1
+        if let Some(vertices) = input.vertices {
+            sim.set_body_vertices(index, vertices.as_chunks().0)?;
+        } else if body.motion.frames.len() > 1
             && let Some(vertices) = body.motion.vertices(time)
         {
             sim.set_body_vertices(index, &vertices)?;
@@ -143,7 +156,7 @@ pub(super) fn step(model: &Model, values: &[f64], sim: &mut Sim, h: f64) -> Resu
 }
 
 /// Targets of the pins that hold at `time` [s]; the others let go.
-fn set_pins(model: &Model, inputs: &Inputs, sim: &mut Sim, time: f64) -> Result<()> {
+fn set_pins(model: &Model, inputs: &Inputs<'_>, sim: &mut Sim, time: f64) -> Result<()> {
     let holds = |p: usize| {
         let until = model.scene.pins[p].until;
         inputs.pins[p].held && until.is_none_or(|until| time <= until)

@@ -5,7 +5,7 @@ use super::instance::{Answer, Instance};
 use super::log::{Log, Status};
 use super::registry::Registry;
 use crate::error::{self, Error};
-use std::path::Path;
+use std::path::PathBuf;
 use std::sync::{Mutex, TryLockError};
 
 static INSTANCES: Registry<Mutex<Instance>> = Registry::new(0x51);
@@ -18,17 +18,33 @@ struct State {
     bytes: Vec<u8>,
 }
 
-/// Makes an instance; its token, or 0 after telling `log` why not.
-pub(super) fn instantiate(name: &str, token: &str, resources: &Path, mut log: Log) -> usize {
+/// What a master asks to be made.
+#[derive(Debug)]
+pub(super) struct Asked {
+    /// The instance's name.
+    pub(super) name: String,
+    /// Instantiation token, GUID.
+    pub(super) token: String,
+    /// Folder of the resources.
+    pub(super) resources: PathBuf,
+}
+
+/// Makes an instance of what `asked` reads; its token, or 0 after telling `log` why not.
+pub(super) fn instantiate(
+    function: &str,
+    mut log: Log,
+    asked: impl FnOnce() -> Result<Asked, Error>,
+) -> usize {
     let made = error::catch(|| {
+        let asked = asked()?;
         // errors are told through the log, which the instance takes only if there is one
         let quiet = Log::new(None, false);
-        let mut instance = Instance::new(name, token, resources, quiet)?;
+        let mut instance = Instance::new(&asked.name, &asked.token, &asked.resources, quiet)?;
         std::mem::swap(instance.log(), &mut log);
         Ok(INSTANCES.insert(Mutex::new(instance)))
     });
     made.unwrap_or_else(|e| {
-        log.say(Status::Error, || format!("instantiating '{name}': {e}"));
+        log.say(Status::Error, || format!("{function}: {e}"));
         0
     })
 }
@@ -148,7 +164,7 @@ pub(super) fn deserialize(token: usize, function: &str, bytes: &[u8], slot: &mut
     })
 }
 
-/// Refuses a call that this FMU does not offer.
-pub(super) fn unsupported(token: usize, function: &str, why: &str) -> Status {
-    with(token, function, |_| Err(Error::unsupported(why).into()))
+/// Refuses a call.
+pub(super) fn refuse(token: usize, function: &str, why: Error) -> Status {
+    with(token, function, |_| Err(why.into()))
 }

@@ -13,7 +13,7 @@ use super::drive;
 use super::log::{Log, Status};
 use super::model::Model;
 use super::results::Results;
-use super::variables::{Quantity, Variable};
+use super::variables::{Quantity, Values, Variable};
 use crate::error::{self, Error, Result};
 use crate::sim::{DrapeOptions, Outcome, Sim};
 use crate::system::state::State;
@@ -80,7 +80,7 @@ pub struct Instance {
     compiled: Vec<f64>,
     /// Values that its tunables were last taken from.
     applied: Vec<f64>,
-    values: Vec<f64>,
+    values: Values,
     mode: Mode,
     start: f64,
     stop: Option<f64>,
@@ -97,14 +97,14 @@ impl Instance {
     /// An instance of the FMU whose resources lie in a folder.
     pub fn new(name: &str, token: &str, resources: &Path, log: Log) -> Result<Self> {
         let (model, sim) = Model::load(resources, token)?;
-        let values = model.start_values();
+        let values = Values::start(&model.variables);
         Ok(Self {
             name: name.to_owned(),
             token: token.to_owned(),
             origin: sim.checkpoint(),
             sim,
-            compiled: values.clone(),
-            applied: values.clone(),
+            compiled: values.scalars.clone(),
+            applied: values.scalars.clone(),
             values,
             model,
             mode: Mode::Instantiated,
@@ -194,10 +194,10 @@ impl Instance {
         if !self.stale {
             return Ok(());
         }
-        if self.broken || self.model.differ(&self.values, &self.compiled) {
-            self.sim = self.model.compile(&self.values)?;
+        if self.broken || self.model.differ(&self.values.scalars, &self.compiled) {
+            self.sim = self.model.compile(&self.values.scalars)?;
             self.origin = self.sim.checkpoint();
-            self.compiled.clone_from(&self.values);
+            self.compiled.clone_from(&self.values.scalars);
             self.broken = false;
             self.log.say(Status::Ok, || {
                 "the simulation was built for changed parameters".into()
@@ -212,9 +212,9 @@ impl Instance {
     }
 
     fn tell_numbers(&mut self) -> Result<()> {
-        drive::settings(&self.model, &self.values, &mut self.sim)?;
-        self.applied.clone_from(&self.values);
-        drive::world(&self.model, &self.values, &mut self.sim)
+        drive::settings(&self.model, &self.values.scalars, &mut self.sim)?;
+        self.applied.clone_from(&self.values.scalars);
+        drive::world(&self.model, &self.values.scalars, &mut self.sim)
     }
 
     /// From Instantiated to Configuration Mode.
@@ -265,7 +265,7 @@ impl Instance {
         let mut status = Status::Ok;
         let wanted = |v: &Variable| v.quantity == Quantity::Drape;
         let drape = self.model.variables.iter().position(wanted);
-        if drape.is_some_and(|d| self.values[d] > 0.5) {
+        if drape.is_some_and(|d| self.values.scalars[d] > 0.5) {
             let options = DrapeOptions {
                 force_tolerance: 0.0,
                 max_steps: 0,
@@ -276,10 +276,11 @@ impl Instance {
             }
             self.log.say(status, || {
                 format!(
-                    "drape: {}, {} steps, residual {:.3e} N",
+                    "drape: {}, {} steps, residual {:.3e} N {}",
                     report.outcome.name(),
                     report.substeps,
-                    report.residual
+                    report.residual,
+                    report.reason
                 )
             });
             self.results = Results::of(Some(report));
@@ -319,7 +320,6 @@ impl Instance {
         match self.advance(size) {
             Ok(report) => {
                 self.time = end;
-                self.results = Results::of(Some(report));
                 if report.outcome != Outcome::Converged {
                     self.log.say(Status::Ok, || {
                         format!(
@@ -330,6 +330,7 @@ impl Instance {
                         )
                     });
                 }
+                self.results = Results::of(Some(report));
                 Ok(Status::Ok)
             }
             Err(e) => {
@@ -359,7 +360,7 @@ impl Instance {
 
     /// As it was when it was made.
     pub fn reset(&mut self) -> Answer {
-        self.values = self.model.start_values();
+        self.values = Values::start(&self.model.variables);
         self.mode = Mode::Instantiated;
         (self.start, self.stop, self.time) = (0.0, None, 0.0);
         self.stale = true;

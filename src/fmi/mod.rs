@@ -10,8 +10,8 @@
 //! * [`instance`]: values, modes, steps, saved states, without C. FMI 2 and 3 both go through it.
 //! * `registry`, `host`: the master's pointers are tokens that are looked up; threads are kept
 //!   apart; panics stop here.
-//! * [`cosim3`], [`cosim3_refused`], [`cosim2`]: the C functions, thin. Only they and `pointers`
-//!   have `unsafe` code.
+//! * [`cosim3`], [`cosim3_refused`], [`cosim2`]: the C functions, thin. What both versions do alike
+//!   stands in `exchange`. Only these and `pointers` have `unsafe` code.
 //! * [`package`] and what it calls: the archive with its model description.
 //!
 //! No state of the process is touched: no working folder, locale, signal handler, panic hook or
@@ -19,6 +19,7 @@
 
 mod describe;
 mod drive;
+mod exchange;
 mod fabric_numbers;
 mod handbook;
 mod host;

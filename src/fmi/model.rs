@@ -153,11 +153,6 @@ impl Model {
         Ok((model, sim))
     }
 
-    /// Values of all variables before anything is set.
-    pub fn start_values(&self) -> Vec<f64> {
-        self.variables.iter().map(|v| v.start).collect()
-    }
-
     /// The variable of a value reference.
     pub fn variable(&self, reference: u32) -> Result<&Variable> {
         self.variables.get(reference as usize).ok_or_else(|| {
@@ -168,7 +163,7 @@ impl Model {
         })
     }
 
-    /// Whether two lists of values ask for different simulations.
+    /// Whether two lists of scalars ask for different simulations.
     pub fn differ(&self, a: &[f64], b: &[f64]) -> bool {
         self.variables
             .iter()
@@ -176,15 +171,22 @@ impl Model {
             .any(|(v, (a, b))| is_compiled(v) && a.to_bits() != b.to_bits())
     }
 
-    /// The simulation for the values of the parameters, nothing run. With other fabrics a garment
-    /// whose scene has a saved state begins at that state's positions, at rest.
+    /// The simulation for the values of the parameters, nothing run. With other fabrics, contact or
+    /// tunables a garment whose scene has a saved state begins at that state's positions, at rest.
     pub fn compile(&self, values: &[f64]) -> Result<Sim> {
         let mut scene = self.scene.clone();
-        let mut other_fabric = false;
+        let mut other = false;
         for (variable, &value) in self.variables.iter().zip(values) {
+            if !is_compiled(variable) {
+                continue;
+            }
+            let matters = match variable.quantity {
+                Quantity::Setting(s) => Settings::KEYS[s].matters(),
+                _ => true,
+            };
+            other |= matters && value.to_bits() != variable.start.to_bits();
             match variable.quantity {
                 Quantity::Fabric(f, number) => {
-                    other_fabric |= value.to_bits() != variable.start.to_bits();
                     *number.slot(&mut scene.garment.fabrics[f]) = value;
                 }
                 Quantity::Contact(b, number) => {
@@ -202,7 +204,7 @@ impl Model {
         for fabric in &scene.garment.fabrics {
             fabric.check()?;
         }
-        if other_fabric && let Some(start) = &self.start {
+        if other && let Some(start) = &self.start {
             scene.initial = Initial {
                 positions: Some(start.clone()),
                 ..Initial::default()

@@ -175,8 +175,8 @@ pub fn package(
     })
 }
 
-/// The draped state as bytes. Without anything that holds the garment it would fall for ever, or be
-/// blown away: it is sewn and relaxed without the forces that do it.
+/// The draped state as bytes. A garment that nothing holds is sewn and relaxed without the forces
+/// that carry it away.
 fn drape(
     mut scene: Scene,
     options: &Options,
@@ -185,25 +185,28 @@ fn drape(
 ) -> Result<Vec<u8>> {
     scene.set_number(crate::scene::THREADS, options.threads)?;
     let (gravity, wind, pressure) = (scene.gravity, scene.wind, scene.pressure);
-    if scene.bodies.is_empty() && scene.pins.is_empty() {
-        (scene.gravity, scene.wind, scene.pressure) = ([0.0; 3], [0.0; 3], 0.0);
-        notes.push(
-            "neither a body nor a pin holds the garment: it is draped without gravity, wind and \
-             pressure, and falls when the run begins"
-                .into(),
-        );
-    }
     let mut sim = sim_scene::build(&scene)?;
     let plan = DrapeOptions {
         force_tolerance: 0.0,
         max_steps: 0,
     };
-    let report = sim.drape(&plan, progress)?;
+    let mut report = sim.drape(&plan, progress)?;
+    if report.outcome == Outcome::Falling {
+        notes.push(format!(
+            "{}: the garment is draped without gravity, wind and pressure, and falls when the run \
+             begins",
+            report.reason
+        ));
+        (scene.gravity, scene.wind, scene.pressure) = ([0.0; 3], [0.0; 3], 0.0);
+        sim = sim_scene::build(&scene)?;
+        report = sim.drape(&plan, progress)?;
+    }
     if report.outcome != Outcome::Converged {
         notes.push(format!(
-            "the drape ended with outcome {}, residual {:.3e} N",
+            "the drape ended with outcome {}, residual {:.3e} N {}",
             report.outcome.name(),
-            report.residual
+            report.residual,
+            report.reason
         ));
     }
     for (k, axis) in ["x", "y", "z"].iter().enumerate() {

@@ -33,13 +33,12 @@ impl Results {
         }
     }
 
-    fn report(&mut self, sim: &Sim) -> Result<StepReport> {
-        if let Some(report) = self.report {
-            return Ok(report);
-        }
-        let report = sim.report()?;
-        self.report = Some(report);
-        Ok(report)
+    fn report(&mut self, sim: &Sim) -> Result<&StepReport> {
+        let report = match self.report.take() {
+            Some(report) => report,
+            None => sim.report()?,
+        };
+        Ok(self.report.insert(report))
     }
 
     fn energies(&mut self, sim: &Sim) -> Result<Energies> {

@@ -9,12 +9,13 @@
 
 use super::instance::Mode;
 use crate::error::{Error, Result};
+use crate::fmi::variables::Values;
 use crate::math::hash::Hash;
 use crate::sim::StepReport;
 use serde::{Deserialize, Serialize};
 
 const MAGIC: &[u8; 8] = b"TOILEFMU";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 const HEADER: usize = 8 + 4 + 8 + 8;
 
 /// What an instance is, beside its scene.
@@ -22,8 +23,8 @@ const HEADER: usize = 8 + 4 + 8 + 8;
 pub(super) struct Saved {
     pub(super) mode: Mode,
     /// Values of all variables that a master may set.
-    pub(super) values: Vec<f64>,
-    /// Those of them that the simulation was last told.
+    pub(super) values: Values,
+    /// Those that the simulation's tunables were last taken from.
     pub(super) applied: Vec<f64>,
     pub(super) start: f64,
     pub(super) stop: Option<f64>,

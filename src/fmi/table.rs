@@ -77,6 +77,7 @@ impl Table {
             unit,
             description: description.into(),
             start: 0.0,
+            starts: Vec::new(),
             min: None,
             max: None,
             nominal: None,

@@ -3,6 +3,10 @@
 //! place in that list.
 
 use super::fabric_numbers::FabricNumber;
+use crate::error::{Error, Result};
+use crate::solve::settings::Settings;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Data type, as FMI 3 names them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -151,6 +155,10 @@ pub enum Quantity {
     BodyVelocity(usize, usize),
     /// Angular velocity of a body, world axes.
     BodyAngularVelocity(usize, usize),
+    /// Does a deforming mesh follow the array of its vertices, or the scene's frames?
+    MeshDriven(usize),
+    /// Vertices of a deforming mesh, body frame.
+    MeshVertices(usize),
     /// Displacement of a pin from where the scene has it.
     PinDisplacement(usize, usize),
     /// Does the pin hold?
@@ -240,8 +248,10 @@ pub struct Variable {
     pub unit: &'static str,
     /// For people.
     pub description: String,
-    /// Value before anything is set; of settable variables only.
+    /// Value before anything is set; of settable scalars only.
     pub start: f64,
+    /// The same of a settable array, row by row; empty for all others.
+    pub starts: Vec<f64>,
     /// Smallest admissible value.
     pub min: Option<f64>,
     /// Greatest admissible value.
@@ -261,9 +271,15 @@ impl Variable {
         )
     }
 
-    /// Whether it has a place in FMI 2, which has scalars only.
+    /// Whether the simulation computes it.
+    pub fn is_computed(&self) -> bool {
+        matches!(self.causality, Causality::Output | Causality::Local)
+    }
+
+    /// Whether it has a place in FMI 2, which has scalars only, and no use for what is about arrays.
     pub fn is_in_fmi2(&self) -> bool {
-        self.dimensions.is_empty() && self.kind.fmi2_name().is_some()
+        let about_array = matches!(self.quantity, Quantity::MeshDriven(_));
+        self.dimensions.is_empty() && self.kind.fmi2_name().is_some() && !about_array
     }
 
     /// Number of scalars in it.
@@ -271,18 +287,84 @@ impl Variable {
         self.dimensions.iter().map(|d| d.size()).product()
     }
 
-    /// Refuses values that it cannot take.
-    pub fn check(&self, value: f64) -> crate::error::Result<()> {
+    /// Refuses a value that it, or an element of it, cannot take.
+    pub fn check(&self, value: f64) -> Result<()> {
         let below = self.min.is_some_and(|min| value < min);
         let above = self.max.is_some_and(|max| value > max);
         if !value.is_finite() || below || above {
             let bound = |b: Option<f64>, none: &str| b.map_or(none.to_owned(), |b| b.to_string());
-            return Err(crate::error::Error::argument(format!(
+            return Err(Error::argument(format!(
                 "{} = {value} must be finite and in [{}, {}]",
                 self.name,
                 bound(self.min, "-inf"),
                 bound(self.max, "inf")
             )));
+        }
+        match self.quantity {
+            Quantity::Setting(s) => Settings::KEYS[s].check(value),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Values of all variables that a master may set.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Values {
+    /// One number for each variable of the list; of scalars that can be set it means something.
+    pub scalars: Vec<f64>,
+    /// Arrays that can be set, by value reference, row by row.
+    pub arrays: BTreeMap<u32, Vec<f64>>,
+}
+
+impl Values {
+    /// Values before anything is set.
+    pub fn start(variables: &[Variable]) -> Self {
+        let listed = (0..).zip(variables);
+        let arrays = listed.filter(|(_, v)| !v.starts.is_empty());
+        Self {
+            scalars: variables.iter().map(|v| v.start).collect(),
+            arrays: arrays.map(|(r, v)| (r, v.starts.clone())).collect(),
+        }
+    }
+
+    /// Numbers of a variable, one for each of its elements.
+    pub fn of(&self, reference: u32) -> &[f64] {
+        match self.arrays.get(&reference) {
+            Some(array) => array,
+            None => std::slice::from_ref(&self.scalars[reference as usize]),
+        }
+    }
+
+    /// The same, to be set.
+    pub fn of_mut(&mut self, reference: u32) -> &mut [f64] {
+        match self.arrays.get_mut(&reference) {
+            Some(array) => array,
+            None => std::slice::from_mut(&mut self.scalars[reference as usize]),
+        }
+    }
+
+    /// Refuses values that are not those of `variables`, or that one of them cannot take.
+    pub fn check(&self, variables: &[Variable]) -> Result<()> {
+        let (own, all) = (self.scalars.len(), variables.len());
+        if own != all {
+            return Err(Error::parse(format!("{own} values, {all} are expected")));
+        }
+        let arrays = variables.iter().filter(|v| !v.starts.is_empty());
+        let (own, all) = (self.arrays.len(), arrays.count());
+        if own != all {
+            return Err(Error::parse(format!("{own} arrays, {all} are expected")));
+        }
+        for (reference, variable) in (0..).zip(variables).filter(|(_, v)| v.is_settable()) {
+            let values = self.of(reference);
+            if values.len() != variable.size() {
+                return Err(Error::parse(format!(
+                    "{} has {} numbers, {} are expected",
+                    variable.name,
+                    values.len(),
+                    variable.size()
+                )));
+            }
+            values.iter().try_for_each(|&v| variable.check(v))?;
         }
         Ok(())
     }

@@ -83,6 +83,11 @@ impl BlockMatrix {
     /// `y = A x`.
     pub fn multiply(&self, x: &[Vec3], y: &mut [Vec3]) {
         y.fill(Vec3::zeros());
+        self.add_product(x, y);
+    }
+
+    /// `y += A x`.
+    pub fn add_product(&self, x: &[Vec3], y: &mut [Vec3]) {
         for j in 0..self.n() {
             let (from, to) = (
                 self.pattern.starts[j] as usize,

@@ -165,6 +165,7 @@ struct HingeFrame {
     g: [Vec3; 2],
 }
 
+#[inline]
 fn hinge_frame(x: &[Vec3; 4], floor: HingeFloor) -> HingeFrame {
     let (e, u) = (x[1] - x[0], [x[2] - x[0], x[3] - x[0]]);
     let n = [e.cross(&u[0]), u[1].cross(&e)];
@@ -184,6 +185,7 @@ fn hinge_frame(x: &[Vec3; 4], floor: HingeFloor) -> HingeFrame {
 }
 
 /// Signed angle of a hinge [rad].
+#[inline]
 pub fn dihedral(x: &[Vec3; 4]) -> f64 {
     let (e, u2, u3) = (x[1] - x[0], x[2] - x[0], x[3] - x[0]);
     let (n1, n2) = (e.cross(&u2), u3.cross(&e));
@@ -195,6 +197,7 @@ pub fn dihedral(x: &[Vec3; 4]) -> f64 {
 }
 
 /// Derivative of [`dihedral`] by the four points [1/m].
+#[inline]
 pub fn dihedral_gradient(x: &[Vec3; 4], floor: HingeFloor) -> [Vec3; 4] {
     let f = hinge_frame(x, floor);
     [

@@ -26,6 +26,13 @@ impl Hash {
         }
     }
 
+    /// Takes in the bits of numbers.
+    pub fn numbers(&mut self, numbers: impl IntoIterator<Item = f64>) {
+        for x in numbers {
+            self.add(&x.to_bits().to_le_bytes());
+        }
+    }
+
     /// The hash of all bytes so far.
     pub fn value(&self) -> u64 {
         self.0

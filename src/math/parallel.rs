@@ -91,6 +91,31 @@ impl Workers {
         }
     }
 
+    /// The same with two arrays, cut into the same number of chunks.
+    pub fn chunks_of_two<T: Send, U: Send, F>(
+        &self,
+        (a, chunk_a): (&mut [T], usize),
+        (b, chunk_b): (&mut [U], usize),
+        f: F,
+    ) where
+        F: Fn(usize, &mut [T], &mut [U]) + Sync + Send,
+    {
+        let (chunk_a, chunk_b) = (chunk_a.max(1), chunk_b.max(1));
+        match self.pool() {
+            Some(pool) if a.len() > chunk_a => pool.install(|| {
+                a.par_chunks_mut(chunk_a)
+                    .zip(b.par_chunks_mut(chunk_b))
+                    .enumerate()
+                    .for_each(|(i, (a, b))| f(i, a, b));
+            }),
+            _ => a
+                .chunks_mut(chunk_a)
+                .zip(b.chunks_mut(chunk_b))
+                .enumerate()
+                .for_each(|(i, (a, b))| f(i, a, b)),
+        }
+    }
+
     /// Sum of `f(i)` for `i < count`, added in a fixed order whatever the number of threads.
     pub fn sum<F>(&self, count: usize, f: F) -> f64
     where

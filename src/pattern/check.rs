@@ -35,14 +35,36 @@ impl Garment {
     /// most `max_vertices`.
     pub fn check_within(&self, max_vertices: usize) -> Result<()> {
         self.check_geometry()?;
-        let estimate = self.estimated_vertices(1.0)?;
-        if estimate > max_vertices as f64 {
-            return Err(Error::limit(format!(
-                "garment '{}': edge length {} m asks for about {estimate:.3e} vertices, limit {max_vertices}",
-                self.name, self.edge_length
-            )));
+        self.check_vertices(1.0, max_vertices)
+    }
+
+    /// Checks the estimated vertex count alone, with target lengths times `scale`. An error names the
+    /// panel that asks for most.
+    pub fn check_vertices(&self, scale: f64, max_vertices: usize) -> Result<()> {
+        let mut estimate = 0.0;
+        let mut most: Option<(f64, &Panel)> = None;
+        for panel in &self.panels {
+            let count = panel.estimated_vertices(scale * self.panel_edge_length(panel))?;
+            estimate += count;
+            if !most.is_some_and(|m| m.0 >= count) {
+                most = Some((count, panel));
+            }
         }
-        Ok(())
+        let Some((count, panel)) = most.filter(|_| !(estimate <= max_vertices as f64)) else {
+            return Ok(());
+        };
+        let whose = if panel.edge_length.is_some() {
+            "its own"
+        } else {
+            "the garment's"
+        };
+        Err(Error::limit(format!(
+            "garment '{}': about {estimate:.3e} vertices, limit {max_vertices}; panel '{}' asks for about \
+             {count:.3e} with {whose} edge length of {} m",
+            self.name,
+            panel.name,
+            scale * self.panel_edge_length(panel)
+        )))
     }
 
     /// Checks that panels, seams, fabrics and blend regions are possible and consistent.

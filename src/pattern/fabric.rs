@@ -1,5 +1,6 @@
 //! What a fabric is: areal density, membrane and bending stiffness, damping, thickness, friction.
 
+use super::YarnFabric;
 use crate::error::{Error, Result};
 
 /// Which bending energy a fabric uses.
@@ -44,6 +45,8 @@ pub struct Fabric {
     pub thickness: f64,
     /// Coulomb friction of cloth on cloth.
     pub friction: f64,
+    /// The yarns that it is made of, for panels whose every yarn is simulated.
+    pub yarns: Option<YarnFabric>,
 }
 
 impl Default for Fabric {
@@ -62,6 +65,7 @@ impl Default for Fabric {
             damping_stiffness: 0.0,
             thickness: 1e-3,
             friction: 0.3,
+            yarns: None,
         }
     }
 }
@@ -107,6 +111,10 @@ impl Fabric {
                 "below sqrt(warp weft) in size",
             );
         }
-        Ok(())
+        self.yarns.as_ref().map_or(Ok(()), |yarns| {
+            yarns
+                .check()
+                .map_err(|e| e.at(format!("fabric '{}'", self.name)))
+        })
     }
 }

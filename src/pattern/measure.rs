@@ -138,16 +138,18 @@ impl Garment {
         panel.edge_length.unwrap_or(self.edge_length)
     }
 
-    /// Vertices that a triangulation with these target lengths, times `scale`, will have, roughly:
-    /// one for each `sqrt(3)/2 h^2` of cloth and half of one for each `h` of boundary.
+    /// Vertices that a triangulation with these target lengths, times `scale`, will have, roughly.
     pub fn estimated_vertices(&self, scale: f64) -> Result<f64> {
-        let mut count = 0.0;
-        for panel in &self.panels {
-            let h = scale * self.panel_edge_length(panel);
-            let boundary: f64 = panel.segments()?.iter().map(Segment::length).sum();
-            count +=
-                panel.area()? / (0.866 * h * h) + 0.5 * boundary / h + panel.edge_count() as f64;
-        }
-        Ok(count)
+        let each = |panel: &Panel| panel.estimated_vertices(scale * self.panel_edge_length(panel));
+        self.panels.iter().map(each).sum()
+    }
+}
+
+impl Panel {
+    /// Vertices that a triangulation with target length `h` [m] will have, roughly: one for each
+    /// `sqrt(3)/2 h^2` of cloth and half of one for each `h` of boundary.
+    pub fn estimated_vertices(&self, h: f64) -> Result<f64> {
+        let boundary: f64 = self.segments()?.iter().map(Segment::length).sum();
+        Ok(self.area()? / (0.866 * h * h) + 0.5 * boundary / h + self.edge_count() as f64)
     }
 }

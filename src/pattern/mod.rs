@@ -5,6 +5,7 @@
 //! edges (a dart joins two edges of one panel). World placement is a rigid motion of the plane
 //! `z = 0`.
 
+pub mod chart;
 pub mod check;
 pub mod curve;
 pub mod export;
@@ -12,8 +13,10 @@ pub mod fabric;
 pub mod import;
 pub mod measure;
 pub mod outline;
+pub mod yarn_fabric;
 
 pub use fabric::{BendingModel, Fabric};
+pub use yarn_fabric::YarnFabric;
 
 use crate::math::{Rotation, Vec2, Vec3};
 use curve::Curve;

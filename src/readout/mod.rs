@@ -5,10 +5,12 @@
 
 pub mod crossings;
 pub mod export;
+pub mod flat_yarns;
 pub mod palette;
 pub mod picture;
 pub mod plot;
 pub mod surface;
+pub mod yarns;
 
 use crate::math::{Vec3, topology};
 

@@ -6,6 +6,7 @@ use crate::error::Result;
 use crate::math::Vec3;
 use crate::readout::surface;
 use crate::tri::GarmentMesh;
+use crate::yarn::YarnMesh;
 
 /// Counts and bytes of what was built, as `toile info` prints them.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,6 +15,10 @@ pub struct SystemInfo {
     pub vertices: usize,
     /// Triangles.
     pub triangles: usize,
+    /// Nodes of yarns.
+    pub yarn_nodes: usize,
+    /// Yarns.
+    pub yarns: usize,
     /// Scalar unknowns.
     pub unknowns: usize,
     /// Terms: name and stencils.
@@ -30,6 +35,11 @@ pub struct SystemInfo {
     pub backend: String,
 }
 
+fn leave(points: &mut Vec<Vec3>) -> Vec<Vec3> {
+    let copy = points.clone();
+    std::mem::replace(points, copy)
+}
+
 impl Sim {
     /// Changes with every call that may invalidate a view.
     pub fn epoch(&self) -> u64 {
@@ -43,17 +53,28 @@ impl Sim {
 
     /// Vertex positions [m].
     pub fn positions(&self) -> &[Vec3] {
-        &self.state.positions
+        &self.state.positions[..self.mesh.uv.len()]
     }
 
     /// Vertex velocities [m/s].
     pub fn velocities(&self) -> &[Vec3] {
-        &self.state.velocities
+        &self.state.velocities[..self.mesh.uv.len()]
+    }
+
+    /// The memory of the positions, for those who need them to stay; the simulation goes on with a
+    /// copy.
+    pub fn leave_positions(&mut self) -> Vec<Vec3> {
+        leave(&mut self.state.positions)
+    }
+
+    /// The memory of the velocities, likewise.
+    pub fn leave_velocities(&mut self) -> Vec<Vec3> {
+        leave(&mut self.state.velocities)
     }
 
     /// Unit vertex normals, pointing to the outside of the cloth.
     pub fn normals(&self) -> Vec<Vec3> {
-        surface::normals(&self.state.positions, &self.mesh.triangles)
+        surface::normals(self.positions(), &self.mesh.triangles)
     }
 
     /// Vertex triples.
@@ -84,16 +105,21 @@ impl Sim {
     /// Energies of the present state.
     pub fn energies(&self) -> Result<Energies> {
         let mut out = Energies {
-            kinetic: kinetic_energy(&self.state, &self.masses),
+            kinetic: kinetic_energy(&self.state, &self.engine().system.points.masses),
             ..Energies::default()
         };
         for (name, value) in self.engine().energies(&self.state)? {
             match name {
-                "gravity" => out.gravity += value,
+                "gravity" | "yarn_gravity" => out.gravity += value,
                 "membrane" => out.membrane += value,
                 "hinge" | "quadratic_bending" => out.bending += value,
                 "seam" | "seam_hinge" => out.seam += value,
                 "body_contact" | "edge_contact" | "self_contact" => out.contact += value,
+                "yarn_stretch" | "yarn_bending" | "yarn_shear" | "yarn_spacing" | "yarn_tie"
+                | "stitch_wrapping" | "stitch_length" | "sliding_friction"
+                | "parallel_friction" => {
+                    out.yarn += value;
+                }
                 _ => {}
             }
         }
@@ -104,7 +130,9 @@ impl Sim {
     /// vertex, pinned ones included. On a free vertex at rest it vanishes; on a held one it is what
     /// its holder bears, turned around.
     pub fn forces(&self) -> Result<Vec<Vec3>> {
-        self.engine().forces(&self.state)
+        let mut forces = self.engine().forces(&self.state)?;
+        forces.truncate(self.mesh.uv.len());
+        Ok(forces)
     }
 
     /// A sentence for each panel that was refined with a lower angle limit than asked for.
@@ -129,10 +157,14 @@ impl Sim {
     pub fn info(&self) -> SystemInfo {
         let engine = self.engine();
         let system = &engine.system;
+        let points = &system.points;
+        let moving = (0..points.count()).filter(|p| points.moves(*p)).count();
         SystemInfo {
             vertices: self.mesh.uv.len(),
             triangles: self.mesh.triangles.len(),
-            unknowns: 3 * (self.mesh.uv.len() - self.state.pins.len()),
+            yarn_nodes: self.yarn_nodes().len(),
+            yarns: self.yarns().map_or(0, YarnMesh::yarn_count),
+            unknowns: 3 * (moving - self.state.pins.len()) + system.unknowns.sliding(),
             terms: system
                 .terms
                 .iter()

@@ -5,6 +5,7 @@ use crate::cloth::Cloth;
 use crate::error::{Error, Result};
 use crate::solve::drape;
 use crate::solve::engine::Engine;
+use crate::solve::relax::End;
 use crate::solve::step::{self, Totals};
 use crate::system::build::{BuildOptions, System};
 use crate::system::state::State;
@@ -18,6 +19,16 @@ const SMALLEST_LEVEL: f64 = 200.0;
 impl Sim {
     /// Advances by exactly `dt` [s], or returns the state untouched.
     pub fn step(&mut self, dt: f64) -> Result<StepReport> {
+        self.step_watched(dt, &mut |_| true)
+    }
+
+    /// [`Sim::step`] that tells how far it has come before every substep. The callback returns false
+    /// to stop, which leaves the state as it was before the step and is no error.
+    pub fn step_watched(
+        &mut self,
+        dt: f64,
+        progress: &mut dyn FnMut(&Progress) -> bool,
+    ) -> Result<StepReport> {
         if !(dt.is_finite() && dt > 0.0 && dt <= 1e6) {
             return Err(Error::argument(format!(
                 "dt = {dt} s must be positive and at most 1e6"
@@ -25,17 +36,39 @@ impl Sim {
         }
         let saved = self.state.clone();
         let mut engine = self.engine.lock().unwrap_or_else(PoisonError::into_inner);
-        let done = step::step(&mut engine, &mut self.state, dt).and_then(|totals| {
-            let outcome = if totals.cut {
-                Outcome::Substepped
-            } else {
-                Outcome::Converged
+        let mut watch = |fraction, residual| {
+            progress(&Progress {
+                fraction,
+                stage: "step",
+                residual,
+            })
+        };
+        let done = step::step(&mut engine, &mut self.state, dt, &mut watch).and_then(|totals| {
+            let (outcome, advanced) = match &totals {
+                None => (Outcome::Cancelled, 0.0),
+                Some(totals) if totals.cut => (Outcome::Substepped, dt),
+                Some(_) => (Outcome::Converged, dt),
             };
-            describe(&mut engine, &self.state, &totals, outcome, dt)
+            let totals = match totals {
+                Some(totals) => totals,
+                None => Totals {
+                    residual: engine.residual(&self.state)?,
+                    ..Totals::default()
+                },
+            };
+            let reason = String::new();
+            describe(
+                &mut engine,
+                &self.state,
+                &totals,
+                (outcome, reason),
+                advanced,
+            )
         });
         drop(engine);
         match done {
             Ok(report) => {
+                self.carry_vertices();
                 self.epoch += 1;
                 Ok(report)
             }
@@ -73,19 +106,13 @@ impl Sim {
             },
         };
         let saved = self.state.clone();
-        let flat = self.state.positions == self.mesh.placed;
+        let flat = *self.positions() == *self.mesh.placed;
         // a coarse sheet that nothing sews or carries finds folds that the fine one does not have
         let levels = if flat && !self.mesh.seams.is_empty() {
             self.coarse_levels()?
         } else {
             Vec::new()
         };
-        for body in &mut self.state.bodies {
-            body.pose = body.target;
-            if !body.target_vertices.is_empty() {
-                body.vertices = std::mem::take(&mut body.target_vertices);
-            }
-        }
         let mut engine = self.engine.lock().unwrap_or_else(PoisonError::into_inner);
         let mut furthest = 0.0_f64;
         let done = drape::drape(
@@ -104,19 +131,14 @@ impl Sim {
             },
         )
         .and_then(|relaxed| {
-            let outcome = if relaxed.cancelled {
-                Outcome::Cancelled
-            } else if relaxed.converged {
-                Outcome::Converged
-            } else {
-                Outcome::IterationLimit
-            };
-            describe(&mut engine, &self.state, &relaxed.totals, outcome, 0.0)
+            let ended = self.ended(relaxed.end);
+            describe(&mut engine, &self.state, &relaxed.totals, ended, 0.0)
         });
         drop(engine);
         match done {
             Ok(report) => {
                 self.end_placement();
+                self.carry_vertices();
                 self.epoch += 1;
                 Ok(report)
             }
@@ -165,7 +187,27 @@ impl Sim {
         } else {
             Outcome::IterationLimit
         };
-        describe(&mut engine, &self.state, &totals, outcome, 0.0)
+        let ended = (outcome, String::new());
+        describe(&mut engine, &self.state, &totals, ended, 0.0)
+    }
+
+    /// How a drape ended, for hosts.
+    fn ended(&self, end: End) -> (Outcome, String) {
+        match end {
+            End::Rest => (Outcome::Converged, String::new()),
+            End::Limit => (Outcome::IterationLimit, String::new()),
+            End::Cancelled => (Outcome::Cancelled, String::new()),
+            End::Stalled(reason) => (Outcome::Stalled, reason),
+            End::Falling(panel) => {
+                let name = self.garment.panels.get(panel as usize).map(|p| &p.name);
+                let reason = format!(
+                    "panel '{}' and what is sewn to it fall for ever: no pin holds them, and nothing on \
+                     their way will stop them",
+                    name.map_or("", String::as_str)
+                );
+                (Outcome::Falling, reason)
+            }
+        }
     }
 }
 
@@ -173,21 +215,22 @@ fn describe(
     engine: &mut Engine,
     state: &State,
     totals: &Totals,
-    outcome: Outcome,
+    (outcome, reason): (Outcome, String),
     advanced: f64,
 ) -> Result<StepReport> {
     let potential_energy = engine.potential_energy(state)?;
     let system = &engine.system;
     Ok(StepReport {
         outcome,
+        reason,
         newton_iterations: totals.newton_iterations,
         linear_iterations: totals.linear_iterations,
         substeps: totals.substeps,
         advanced,
         residual: totals.residual,
-        max_edge_strain: system.largest_strain(&state.positions),
+        max_edge_strain: system.largest_strain(state),
         min_gap: system.smallest_gap(&state.positions),
-        kinetic_energy: kinetic_energy(state, &system.cloth.masses),
+        kinetic_energy: kinetic_energy(state, &system.points.masses),
         potential_energy,
         max_seam_gap: system.largest_seam_gap(&state.positions),
     })

@@ -5,6 +5,7 @@ use crate::body::{Body, Pose};
 use crate::error::{Error, Result};
 use crate::math::{Rotation, Vec3};
 use crate::system::bodies::check_index;
+use crate::system::snapshot::BodyOrigin;
 use crate::system::state::{Pin, State};
 use std::sync::PoisonError;
 
@@ -14,6 +15,10 @@ impl Sim {
         contact.check()?;
         let entry = self.engine().system.bodies.add(body, contact);
         self.state.bodies.push(entry);
+        self.origin.bodies.push(BodyOrigin {
+            shape: body.fingerprint(),
+            contact: *contact,
+        });
         self.bodies.push((body.clone(), *contact));
         self.epoch += 1;
         Ok((self.bodies.len() - 1) as u32)
@@ -40,7 +45,7 @@ impl Sim {
 
     /// Where the body is to be at the end of the next step; the cloth feels the velocity that
     /// follows. Before the first step or drape it is a placement: the body stands there at once and
-    /// has no velocity. A drape takes the body to its pose before it begins.
+    /// has no velocity. A drape takes the body to its pose as it begins, and what lies on it along.
     pub fn set_body_pose(&mut self, body: u32, position: [f64; 3], xyzw: [f64; 4]) -> Result<()> {
         let b = check_index(body, self.bodies.len())?;
         finite("position", &position)?;
@@ -93,13 +98,12 @@ impl Sim {
         let state = &mut self.state.bodies[b];
         if !state.moved_with_time {
             // a placement: the deformed field must exist before anything is changed
-            self.bodies[b].0.deformed_with(
-                &vertices,
-                self.engine
-                    .lock()
-                    .unwrap_or_else(PoisonError::into_inner)
-                    .workers(),
-            )?;
+            let mut engine = self.engine.lock().unwrap_or_else(PoisonError::into_inner);
+            let deformed = self.bodies[b]
+                .0
+                .deformed_with(&vertices, engine.workers())?;
+            engine.system.bodies.place(b, deformed, &vertices);
+            drop(engine);
             state.vertices.clone_from(&vertices);
             state.target_vertices.clear();
         } else {
@@ -107,6 +111,15 @@ impl Sim {
         }
         self.epoch += 1;
         Ok(())
+    }
+
+    /// Puts the vertices of a deforming mesh somewhere at once, as `place_body` does with a pose.
+    pub fn place_body_vertices(&mut self, body: u32, positions: &[[f64; 3]]) -> Result<()> {
+        let b = check_index(body, self.bodies.len())?;
+        let moved = std::mem::replace(&mut self.state.bodies[b].moved_with_time, false);
+        let placed = self.set_body_vertices(body, positions);
+        self.state.bodies[b].moved_with_time = moved;
+        placed
     }
 
     /// From here on a pose is a motion, even before the first step.
@@ -140,16 +153,26 @@ impl Sim {
             }
         }
         for (k, &vertex) in vertices.iter().enumerate() {
-            let target = targets.map_or(self.state.positions[vertex as usize], |targets| {
-                Vec3::from(targets[k])
-            });
-            match self.state.pins.binary_search_by_key(&vertex, |p| p.vertex) {
-                Ok(i) => self.state.pins[i].target = target,
-                Err(i) => self.state.pins.insert(i, Pin { vertex, target }),
-            }
+            self.hold(vertex, targets.map(|t| Vec3::from(t[k])));
         }
         self.epoch += 1;
         Ok(())
+    }
+
+    /// Holds a point at a target, or where it is.
+    pub(super) fn hold(&mut self, point: u32, target: Option<Vec3>) {
+        let target = target.unwrap_or(self.state.positions[point as usize]);
+        let pins = &mut self.state.pins;
+        match pins.binary_search_by_key(&point, |p| p.vertex) {
+            Ok(i) => pins[i].target = target,
+            Err(i) => pins.insert(
+                i,
+                Pin {
+                    vertex: point,
+                    target,
+                },
+            ),
+        }
     }
 
     /// Lets vertices go; one that is not pinned is refused.
@@ -176,7 +199,14 @@ impl Sim {
     }
 
     fn check_vertices(&self, vertices: &[u32]) -> Result<()> {
-        let n = self.state.positions.len();
+        let n = self.mesh.uv.len();
+        if let Some(part) = &self.yarns
+            && let Some(v) = vertices.iter().find(|v| part.follows(**v))
+        {
+            return Err(Error::argument(format!(
+                "vertex {v} follows the yarns of its panel: hold nodes of yarns there"
+            )));
+        }
         match vertices.iter().find(|&&v| v as usize >= n) {
             Some(v) => Err(Error::argument(format!(
                 "vertex {v} does not exist; there are {n} vertices"
@@ -205,10 +235,10 @@ impl Sim {
             .ok_or_else(|| Error::argument(format!("panel {panel} has no vertices")))
     }
 
-    /// Sets positions [m] and velocities [m/s] of every vertex (`None`: zero). Friction anchors are
-    /// forgotten; pins keep their targets.
+    /// Sets positions [m] and velocities [m/s] of every vertex (`None`: zero); nodes of yarns go where
+    /// the vertices of their triangles are. Friction anchors are forgotten; pins keep their targets.
     pub fn set_positions(&mut self, x: &[[f64; 3]], v: Option<&[[f64; 3]]>) -> Result<()> {
-        let n = self.state.positions.len();
+        let n = self.mesh.uv.len();
         if x.len() != n || v.is_some_and(|v| v.len() != n) {
             return Err(Error::argument(format!(
                 "{n} vertices, not {}, are expected",
@@ -222,8 +252,15 @@ impl Sim {
         );
         finite_points("position of vertex", &x)?;
         finite_points("velocity of vertex", &v)?;
-        self.state.positions = x;
-        self.state.velocities = v;
+        let mut state = State {
+            positions: x,
+            velocities: v,
+            ..self.state.clone()
+        };
+        if let Some(part) = &self.yarns {
+            part.take(&self.mesh, &mut state)?;
+        }
+        self.state = state;
         self.state.body_anchors.clear();
         self.state.pair_anchors.clear();
         self.state.step_size = f64::MAX;
@@ -240,6 +277,7 @@ impl Sim {
             let mut settings = self.settings.clone();
             settings.set(name, value)?;
             self.engine().set_settings(&settings)?;
+            self.origin.numbers = settings.that_matter();
             self.settings = settings;
         }
         self.epoch += 1;

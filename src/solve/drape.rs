@@ -1,11 +1,14 @@
 //! Static drape: sewing, coarse levels, the unfolding of a tangle, and rest.
 
 use super::engine::Engine;
-use super::relax::{RelaxOptions, Relaxed, relax};
+use super::relax::{End, RelaxOptions, Relaxed, relax};
+use super::rest::{self, Rest};
 use super::step::{Totals, step};
+use crate::blend::embed::carried;
 use crate::error::{Result, Status};
 use crate::math::Vec3;
 use crate::system::build::System;
+use crate::system::contact::crossing::SewnSurface;
 use crate::system::state::{Pin, State};
 use crate::tri::Transfer;
 
@@ -71,10 +74,12 @@ pub fn drape(
     watch: &mut Watch<'_>,
 ) -> Result<Relaxed> {
     engine.begin();
+    if flat {
+        place_bodies(state);
+    }
     let mut all = Relaxed {
         totals: Totals::default(),
-        converged: false,
-        cancelled: false,
+        end: End::Limit,
     };
     let mut carried: Option<(Engine, State)> = None;
     for level in levels {
@@ -99,13 +104,22 @@ pub fn drape(
                 watch,
             )?;
         }
-        carried = Some((coarse, coarse_state));
-        if all.cancelled {
+        if all.is_over() {
+            carried = Some((coarse, coarse_state));
             break;
         }
+        carried = is_uncrossed(&coarse, &coarse_state)?.then_some((coarse, coarse_state));
     }
     // a drape that was stopped while it sewed goes on with that
     let open = engine.system.largest_seam_gap(&state.positions) > NEARLY_CLOSED;
+    if !flat && !open && is_settled(state) && engine.residual(state)? <= plan.force_tolerance {
+        // at rest already: left there, not disturbed to be brought back
+        all.end = End::Rest;
+        return stopped(engine, state, all);
+    }
+    if open {
+        place_bodies(state);
+    }
     match &carried {
         Some((from, positions)) => transfer(from, positions, engine, state)?,
         None if flat || open => {
@@ -113,46 +127,92 @@ pub fn drape(
         }
         None => {}
     }
-    if all.cancelled {
+    if all.is_over() {
         return stopped(engine, state, all);
     }
-    if !flat && tangled(&engine.system, state) {
+    let crumpled = !flat && tangled(&engine.system, state);
+    if crumpled {
+        place_bodies(state);
         let done = unfold(engine, state, plan, &mut all, watch);
         let restored = engine.soften(1.0);
-        let done = done?;
+        done?;
         restored?;
-        if done.cancelled {
+        if all.is_over() {
             return stopped(engine, state, all);
         }
     }
-    let options = settle_options(plan, plan.force_tolerance);
+    let small = engine.system.block_count() <= rest::LARGEST;
+    let mut reached = Rest::None;
+    if small && !flat && !open && !crumpled {
+        let mut watch = |residual| watch(REST.0, "rest", residual);
+        reached = rest::settle(engine, state, plan, &mut all.totals, &mut watch)?;
+    }
+    place_bodies(state);
+    if reached == Rest::Cancelled {
+        all.end = End::Cancelled;
+        return stopped(engine, state, all);
+    }
+    let mut options = settle_options(plan, plan.force_tolerance);
     for round in 0..ROUNDS {
-        let done = stage(engine, state, &options, REST, "rest", &mut all, watch)?;
-        all.converged = done.converged;
-        if !done.converged || done.cancelled || round + 1 == ROUNDS {
+        if reached == Rest::None {
+            stage(engine, state, &options, REST, "rest", &mut all, watch)?;
+            if all.end != End::Rest {
+                break;
+            }
+        }
+        all.end = End::Rest;
+        if reached == Rest::Minimum
+            || round + 1 == ROUNDS
+            || small && engine.is_minimum(state, rest::LONGEST)?
+        {
             break;
         }
-        // Newton's method may stop at an equilibrium that the least motion leaves
-        let rested = state.positions.clone();
+        reached = Rest::None;
+        // the least motion may leave an equilibrium that is no minimum
+        let rested = state.clone();
         let probed = probe(engine, state, &mut all)?;
         let moved = state
             .positions
             .iter()
-            .zip(&rested)
+            .zip(&rested.positions)
             .map(|(p, q)| (p - q).norm());
         if !probed || moved.fold(0.0, f64::max) < STILL {
+            *state = rested;
             break;
         }
+        options.disturbed = false;
     }
-    if all.converged {
-        state.velocities.fill(Vec3::zeros());
-        Ok(all)
-    } else {
-        stopped(engine, state, all)
+    stopped(engine, state, all)
+}
+
+/// Puts bodies where they are to be, without carrying the cloth along.
+fn place_bodies(state: &mut State) {
+    for body in &mut state.bodies {
+        body.pose = body.target;
+        if !body.target_vertices.is_empty() {
+            body.vertices = std::mem::take(&mut body.target_vertices);
+        }
     }
 }
 
-/// The end of a drape before rest, with the residual of the state that it leaves.
+/// Whether a coarse level may be carried on: a fold that passes through the cloth would stay for
+/// good, since contact does not uncross. The next level is sewn from where the panels are placed then.
+fn is_uncrossed(coarse: &Engine, state: &State) -> Result<bool> {
+    if coarse.settings.self_contact < 0.5 {
+        return Ok(true);
+    }
+    let sewn = SewnSurface::new(&coarse.system.cloth.mesh, &state.positions);
+    Ok(sewn.crossings(1)?.is_empty())
+}
+
+/// Whether pins and bodies are where they are to be.
+fn is_settled(state: &State) -> bool {
+    let pinned = |p: &Pin| state.positions[p.vertex as usize] == p.target;
+    state.pins.iter().all(pinned)
+        && (state.bodies.iter()).all(|b| b.pose == b.target && b.target_vertices.is_empty())
+}
+
+/// The end of a drape, with the residual of the state that it leaves.
 fn stopped(engine: &mut Engine, state: &mut State, mut all: Relaxed) -> Result<Relaxed> {
     state.velocities.fill(Vec3::zeros());
     all.totals.residual = engine.residual(state)?;
@@ -176,7 +236,7 @@ fn unfold(
     plan: &Plan,
     all: &mut Relaxed,
     watch: &mut Watch<'_>,
-) -> Result<Relaxed> {
+) -> Result<()> {
     let cloth = &engine.system.cloth;
     let weight = state.gravity.norm() * cloth.masses.iter().sum::<f64>() / cloth.area().sqrt();
     let mut factor = (SOFTEST * weight / cloth.mean_stiffness()).clamp(LEAST_FACTOR, 1.0);
@@ -186,15 +246,17 @@ fn unfold(
         max_steps: plan.max_steps.min(UNFOLD_STEPS),
         first_step: 0.1,
         largest_step: 10.0,
+        disturbed: true,
     };
     loop {
         engine.soften(factor)?;
-        let done = stage(engine, state, &options, UNFOLD, "unfold", all, watch)?;
+        stage(engine, state, &options, UNFOLD, "unfold", all, watch)?;
         factor *= STIFFEN;
-        if done.cancelled || factor >= 1.0 {
-            return Ok(done);
+        if all.is_over() || factor >= 1.0 {
+            return Ok(());
         }
         options.max_steps = plan.max_steps.min(STIFFEN_STEPS);
+        options.disturbed = false;
     }
 }
 
@@ -205,8 +267,9 @@ fn probe(engine: &mut Engine, state: &mut State, all: &mut Relaxed) -> Result<bo
     let mut quiet = 0;
     for _ in 0..PROBE_STEPS {
         let start = state.positions.clone();
-        match step(engine, state, PROBE_STEP) {
+        match step(engine, state, PROBE_STEP, &mut |_, _| true) {
             Ok(totals) => {
+                let totals = totals.unwrap_or_default();
                 all.totals.newton_iterations += totals.newton_iterations;
                 all.totals.linear_iterations += totals.linear_iterations;
                 all.totals.substeps += totals.substeps;
@@ -247,10 +310,11 @@ fn settle_options(plan: &Plan, force_tolerance: f64) -> RelaxOptions {
         max_steps: plan.max_steps,
         first_step: 0.01,
         largest_step: 10.0,
+        disturbed: true,
     }
 }
 
-/// Pulls the seams together without weight and friction. False if the host stopped it.
+/// Pulls the seams together without weight and friction. False if the drape is to end there.
 fn sew(
     engine: &mut Engine,
     state: &mut State,
@@ -267,6 +331,7 @@ fn sew(
         max_steps: plan.max_steps,
         first_step: 0.01,
         largest_step: 0.05,
+        disturbed: false,
     };
     let gravity = std::mem::replace(&mut state.gravity, Vec3::zeros());
     let smooth = engine.system.bodies.with_friction(0.0);
@@ -277,9 +342,9 @@ fn sew(
     state.gravity = gravity;
     state.body_anchors.clear();
     let restored = engine.set_settings(&settings);
-    let done = done?;
+    done?;
     restored?;
-    Ok(!done.cancelled)
+    Ok(!all.is_over())
 }
 
 /// Sews with the pull of the settings; a seam that stays open under it, because the garment is
@@ -290,18 +355,18 @@ fn close(
     options: &RelaxOptions,
     all: &mut Relaxed,
     watch: &mut Watch<'_>,
-) -> Result<Relaxed> {
+) -> Result<()> {
     let mut settings = engine.settings.clone();
-    let mut done = stage(engine, state, options, SEW, "sew", all, watch)?;
+    stage(engine, state, options, SEW, "sew", all, watch)?;
     for _ in 0..DOUBLINGS {
-        if done.cancelled || engine.system.largest_seam_gap(&state.positions) < NEARLY_CLOSED {
+        if all.is_over() || engine.system.largest_seam_gap(&state.positions) < NEARLY_CLOSED {
             break;
         }
         settings.seam_pull *= 2.0;
         engine.set_settings(&settings)?;
-        done = stage(engine, state, options, SEW, "sew", all, watch)?;
+        stage(engine, state, options, SEW, "sew", all, watch)?;
     }
-    Ok(done)
+    Ok(())
 }
 
 fn stage(
@@ -312,7 +377,7 @@ fn stage(
     name: &'static str,
     all: &mut Relaxed,
     watch: &mut Watch<'_>,
-) -> Result<Relaxed> {
+) -> Result<()> {
     let mut first = 0.0_f64;
     let mut best = 0.0_f64;
     let done = relax(engine, state, options, &mut |step, residual| {
@@ -327,8 +392,15 @@ fn stage(
     all.totals.newton_iterations += done.totals.newton_iterations;
     all.totals.linear_iterations += done.totals.linear_iterations;
     all.totals.residual = done.totals.residual;
-    all.cancelled |= done.cancelled;
-    Ok(done)
+    all.end = done.end;
+    Ok(())
+}
+
+impl Relaxed {
+    /// Whether what ended a stage ends the whole drape.
+    fn is_over(&self) -> bool {
+        matches!(self.end, End::Cancelled | End::Falling(_))
+    }
 }
 
 /// The state of a coarse level: as placed, in the same world, held at the vertices nearest to the
@@ -368,6 +440,10 @@ fn transfer(from: &Engine, positions: &State, to: &Engine, state: &mut State) ->
     let (coarse, fine) = (&from.system.cloth.mesh, &to.system.cloth.mesh);
     let map = Transfer::new(coarse, fine)?;
     state.positions = map.apply(&coarse.triangles, &positions.positions);
+    if let Some(yarns) = &to.system.yarns {
+        let nodes = carried(coarse, &positions.positions, &yarns.mesh)?;
+        state.positions.extend(nodes);
+    }
     state.velocities.fill(Vec3::zeros());
     state.body_anchors.clear();
     state.pair_anchors.clear();

@@ -1,5 +1,8 @@
 //! One compiled system with what is needed to advance it: terms, matrix, linear solver, threads.
 
+use super::admissible::inadmissible;
+use super::carry::Carry;
+use super::linear::direct::Direct;
 use super::linear::ordering::seam_priorities;
 use super::linear::{LinearSolver, choose};
 use super::newton::{Inertia, Problem, Summary, Tolerance, Work, largest};
@@ -8,10 +11,13 @@ use crate::error::Result;
 use crate::math::Vec3;
 use crate::math::parallel::Workers;
 use crate::system::assemble::{Assembler, energy};
-use crate::system::bodies::SLOPE;
+use crate::system::bodies::AtStart;
 use crate::system::build::{BuildOptions, System};
 use crate::system::state::State;
-use crate::system::term::{Bodies, Configuration, World};
+use crate::system::term::{Configuration, World};
+
+/// Corrections of one attempt at rest.
+const REST_ITERATIONS: u32 = 8;
 
 /// A system and its solver.
 pub struct Engine {
@@ -21,6 +27,8 @@ pub struct Engine {
     pub settings: Settings,
     assembler: Assembler,
     linear: Box<dyn LinearSolver>,
+    /// Solves at rest, where the exact Hessian has to be factored as it is.
+    direct: Direct,
     workers: Workers,
     work: Work,
     weight: Vec<f64>,
@@ -29,6 +37,8 @@ pub struct Engine {
     fixed: Vec<bool>,
     idle: Vec<(u32, u8)>,
     start: Vec<Vec3>,
+    u: Vec<f64>,
+    carry: Carry,
 }
 
 /// What one attempt at a substep came to.
@@ -52,6 +62,12 @@ pub enum Motion {
         /// Whether friction anchors and normal forces follow the step.
         follow: bool,
     },
+    /// To rest by Newton's method with the exact Hessian alone, rate terms off. What touches a body
+    /// is first carried along with it.
+    Rest {
+        /// Largest force on a free vertex at its end [N].
+        force: f64,
+    },
 }
 
 impl Engine {
@@ -64,6 +80,7 @@ impl Engine {
         Self {
             assembler,
             linear,
+            direct: Direct::new(&workers),
             workers,
             work: Work::default(),
             weight: Vec::new(),
@@ -72,6 +89,8 @@ impl Engine {
             fixed: Vec::new(),
             idle: Vec::new(),
             start: Vec::new(),
+            u: Vec::new(),
+            carry: Carry::default(),
             settings: settings.clone(),
             system,
         }
@@ -82,6 +101,7 @@ impl Engine {
         let threads = settings.threads.to_bits() != self.settings.threads.to_bits();
         if threads {
             self.workers = Workers::new(settings.threads as usize);
+            self.direct = Direct::new(&self.workers);
         }
         if threads || settings.linear_kind.to_bits() != self.settings.linear_kind.to_bits() {
             self.linear = linear_solver(&self.system, settings, &self.workers);
@@ -117,7 +137,7 @@ impl Engine {
 
     /// Bytes of the solver's factor and work arrays.
     pub fn factor_bytes(&self) -> usize {
-        self.linear.bytes()
+        self.linear.bytes() + self.direct.bytes()
     }
 
     /// Bytes of the matrix and the scatter plans.
@@ -155,19 +175,29 @@ impl Engine {
                 .rebuild(self.system.block_count(), &self.system.terms);
         }
         let dynamic = motion == Motion::Dynamic;
+        let rest = matches!(motion, Motion::Rest { .. });
         let inv_dt = if dynamic { 1.0 / h } else { 0.0 };
         self.system.bodies.prepare(state, fraction, &self.workers)?;
         self.system.pack(state, &mut self.start);
+        self.u.clone_from(&state.u);
         self.set_inertia(state, h, dynamic);
         let mut x = self.start.clone();
         for pin in &state.pins {
             let i = pin.vertex as usize;
             self.fixed[i] = true;
-            x[i] = x[i].lerp(&pin.target, fraction);
+            let mut place = x[i].lerp(&pin.target, fraction);
             if fraction >= 1.0 {
-                x[i] = pin.target;
+                place = pin.target;
             }
-            self.center[i] = x[i];
+            self.center[i] = place;
+            if !rest {
+                x[i] = place;
+            }
+        }
+        self.carry.way.clear();
+        if rest {
+            self.carry
+                .take_along(state, &self.center, &self.fixed, &self.system.bodies);
         }
         let n = x.len();
         let system = &mut self.system;
@@ -181,6 +211,7 @@ impl Engine {
             let at = Configuration {
                 x: &self.start,
                 x0: &self.start,
+                u: &self.u,
                 inv_dt,
                 world: &world,
             };
@@ -196,6 +227,7 @@ impl Engine {
             terms: &system.terms,
             world: &world,
             x0: &self.start,
+            u: &self.u,
             inv_dt,
             inertia: Inertia {
                 weight: &self.weight,
@@ -217,10 +249,14 @@ impl Engine {
             } else {
                 0.0
             },
-            force: 0.0,
+            force: match motion {
+                Motion::Rest { force } => force,
+                _ => 0.0,
+            },
             iterations: match motion {
                 Motion::Dynamic => self.settings.newton_max_iterations as u32,
                 Motion::Relax { .. } => 1,
+                Motion::Rest { .. } => REST_ITERATIONS,
             },
             // a relaxation takes one correction for each matrix: a rough one will do
             linear: if dynamic {
@@ -230,32 +266,69 @@ impl Engine {
             },
             exactness: f64::from(u8::from(matches!(
                 motion,
-                Motion::Relax { exact: true, .. }
+                Motion::Relax { exact: true, .. } | Motion::Rest { .. }
             ))),
             most_exactness: f64::from(u8::from(!matches!(
                 motion,
                 Motion::Relax { exact: false, .. }
             ))),
+            strict: rest,
         };
-        let summary = problem.minimise(
+        let linear: &mut dyn LinearSolver = if rest {
+            &mut self.direct
+        } else {
+            self.linear.as_mut()
+        };
+        let mut tried = 0;
+        if !self.carry.way.is_empty() {
+            let before = AtStart(&system.bodies);
+            let answer = Problem {
+                world: &World {
+                    bodies: &before,
+                    ..world
+                },
+                fixed: &self.carry.held,
+                ..problem
+            }
+            .answer(
+                &x,
+                &self.carry.way,
+                &mut self.assembler,
+                linear,
+                &mut self.work,
+            );
+            tried = answer.0;
+            for pin in &state.pins {
+                x[pin.vertex as usize] = self.center[pin.vertex as usize];
+            }
+            // where that costs energy everything but the pins is left behind
+            if let Some(answer) = answer.1
+                && problem.value(&answer) <= problem.value(&x)
+            {
+                x = answer;
+            }
+        }
+        let mut summary = problem.minimise(
             &mut x,
             &tolerance,
             &mut self.assembler,
-            self.linear.as_mut(),
+            linear,
             &mut self.work,
         )?;
+        summary.iterations += tried;
         let refused = if dynamic && !summary.converged {
             Some("Newton's method did not converge")
-        } else if !dynamic && summary.last_length == 0.0 {
+        } else if !dynamic && summary.last_length == 0.0 && !summary.converged {
             Some("the line search found no decrease")
         } else {
             let at = Configuration {
                 x: &x,
                 x0: &self.start,
+                u: &self.u,
                 inv_dt,
                 world: &world,
             };
-            inadmissible(system, &at, dynamic)
+            inadmissible(system, &at, dynamic, &self.workers)
         };
         if let Some(reason) = refused {
             return Ok(Attempt::Rejected(reason, summary));
@@ -263,6 +336,7 @@ impl Engine {
         let at = Configuration {
             x: &x,
             x0: &self.start,
+            u: &self.u,
             inv_dt,
             world: &world,
         };
@@ -272,8 +346,45 @@ impl Engine {
             }
         }
         system.unpack(&self.start, &x, h, state);
+        if !matches!(motion, Motion::Relax { follow: false, .. }) {
+            system.follow_contacts(state, &self.workers);
+        }
         system.bodies.accept(state);
         Ok(Attempt::Accepted(summary))
+    }
+
+    /// Whether a state at rest is a minimum of the energy: whether the exact Hessian with the inertia
+    /// of a step `h` [s] is positive definite there.
+    pub fn is_minimum(&mut self, state: &State, h: f64) -> Result<bool> {
+        self.with_present(state, |engine, at| {
+            engine.start.clear();
+            engine.start.extend_from_slice(at.x);
+            engine.set_inertia(state, h, false);
+            for pin in &state.pins {
+                engine.fixed[pin.vertex as usize] = true;
+            }
+            let problem = Problem {
+                terms: &engine.system.terms,
+                world: at.world,
+                x0: at.x0,
+                u: at.u,
+                inv_dt: at.inv_dt,
+                inertia: Inertia {
+                    weight: &engine.weight,
+                    measure: &engine.measure,
+                    center: &engine.center,
+                },
+                fixed: &engine.fixed,
+                idle: &engine.idle,
+                workers: &engine.workers,
+            };
+            problem.is_convex(
+                at.x,
+                &mut engine.assembler,
+                &mut engine.direct,
+                &mut engine.work,
+            )
+        })
     }
 
     /// The quadratic part of a substep's potential. The terms of yarns bring their own inertia, which
@@ -325,6 +436,8 @@ impl Engine {
             for term in &mut engine.system.terms {
                 term.accept(at, state);
             }
+            let workers = engine.workers.clone();
+            engine.system.follow_contacts(state, &workers);
         })
     }
 
@@ -394,6 +507,7 @@ impl Engine {
         let at = Configuration {
             x: &x,
             x0: &x,
+            u: &state.u,
             inv_dt: 0.0,
             world: &world,
         };
@@ -428,34 +542,4 @@ fn linear_solver(system: &System, settings: &Settings, workers: &Workers) -> Box
         Some(&priorities),
         workers,
     )
-}
-
-/// Why a converged substep may still not stand.
-fn inadmissible(system: &System, at: &Configuration<'_>, dynamic: bool) -> Option<&'static str> {
-    let count = system.points.count();
-    let (start, x) = (&at.x0[..count], &at.x[..count]);
-    let bodies = &system.bodies;
-    for b in 0..bodies.count() {
-        let limit = system.depth_limit(b);
-        for (x0, x1) in start.iter().zip(x) {
-            // what the distance cannot have fallen by on this path is clear
-            let room = bodies.value_at_start(b, x0) + limit;
-            if room > SLOPE * bodies.travel(b, x0, x1) {
-                continue;
-            }
-            if room > 0.0 && bodies.value(b, x1) < -limit {
-                return Some("a vertex went too deep into a body");
-            }
-            if bodies.passes_through(b, x0, x1, limit) {
-                return Some("a vertex passed through a body");
-            }
-        }
-    }
-    if system.terms.iter().any(|term| term.max_step(at) < 1.0) {
-        return Some("cloth would pass through itself");
-    }
-    if dynamic && system.largest_stretch_change(start, x) > 0.2 {
-        return Some("an edge changed its length too much");
-    }
-    None
 }

@@ -1,10 +1,14 @@
 //! Solvers: Newton with a line search, step control, static drape, linear systems behind one trait.
 
+mod admissible;
+mod carry;
 pub mod drape;
+mod drift;
 pub mod engine;
 pub mod linear;
 pub mod newton;
 pub mod relax;
 pub mod report;
+pub mod rest;
 pub mod settings;
 pub mod step;

@@ -16,6 +16,7 @@ use crate::system::assemble::{Assembler, energy, fix_rows};
 use crate::system::term::{Configuration, HessianKind, Term, World};
 
 /// The quadratic part of the incremental potential.
+#[derive(Clone, Copy)]
 pub struct Inertia<'a> {
     /// Weight of each vertex [N/m].
     pub weight: &'a [f64],
@@ -43,6 +44,9 @@ pub struct Tolerance {
     pub exactness: f64,
     /// How much of it is tried later.
     pub most_exactness: f64,
+    /// Whether a matrix that is not positive definite ends the solve instead of being made so by
+    /// less of the exact Hessian.
+    pub strict: bool,
 }
 
 /// How a solve ended.
@@ -65,9 +69,14 @@ pub struct Summary {
     pub moved: f64,
     /// How much of the exact Hessian the last correction used.
     pub exactness: f64,
+    /// Whether a strict solve met a matrix that is not positive definite.
+    pub indefinite: bool,
+    /// Corrections by a matrix at a point where nothing was carried any more.
+    pub corrections: u32,
 }
 
 /// What a Newton solve works on and with.
+#[derive(Clone, Copy)]
 pub struct Problem<'a> {
     /// Energies.
     pub terms: &'a [Box<dyn Term>],
@@ -75,6 +84,8 @@ pub struct Problem<'a> {
     pub world: &'a World<'a>,
     /// Start of the substep [m].
     pub x0: &'a [Vec3],
+    /// Material coordinates of yarns at the start of the substep [m].
+    pub u: &'a [f64],
     /// One over the substep size [1/s], 0 in statics.
     pub inv_dt: f64,
     /// Quadratic part.
@@ -96,6 +107,19 @@ pub struct Work {
     trial: Vec<Vec3>,
 }
 
+impl Work {
+    fn resize(&mut self, n: usize) {
+        for v in [
+            &mut self.gradient,
+            &mut self.negative,
+            &mut self.direction,
+            &mut self.trial,
+        ] {
+            v.resize(n, Vec3::zeros());
+        }
+    }
+}
+
 /// Part of the displacement tolerance below which a force that inertia alone resists is no force.
 const UNMOVED: f64 = 1e-3;
 /// Small corrections in one solve that are not taken for convergence at once.
@@ -106,12 +130,14 @@ impl Problem<'_> {
         Configuration {
             x,
             x0: self.x0,
+            u: self.u,
             inv_dt: self.inv_dt,
             world: self.world,
         }
     }
 
-    fn value(&self, x: &[Vec3]) -> f64 {
+    /// `Phi` [J].
+    pub fn value(&self, x: &[Vec3]) -> f64 {
         let inertia = self.workers.sum(x.len(), |i| {
             0.5 * self.inertia.weight[i] * (x[i] - self.inertia.center[i]).norm_squared()
         });
@@ -122,6 +148,7 @@ impl Problem<'_> {
         &self,
         x: &[Vec3],
         kind: HessianKind,
+        way: Option<&[Vec3]>,
         assembler: &mut Assembler,
         gradient: &mut [Vec3],
     ) -> f64 {
@@ -137,6 +164,9 @@ impl Problem<'_> {
             }
         }
         assembler.add(self.terms, &self.at(x), Some(kind), self.workers, gradient);
+        if let Some(way) = way {
+            assembler.matrix().add_product(way, gradient);
+        }
         let matrix = assembler.matrix_mut();
         fix_rows(matrix, self.fixed);
         for (block, c) in self.idle {
@@ -176,6 +206,50 @@ impl Problem<'_> {
         (force, reach)
     }
 
+    /// Moves the fixed vertices along `way` and the others by the linear answer to it. Returns how
+    /// many matrices were tried; the answer is none if no one could be solved.
+    pub fn answer(
+        &self,
+        x: &[Vec3],
+        way: &[Vec3],
+        assembler: &mut Assembler,
+        linear: &mut dyn LinearSolver,
+        work: &mut Work,
+    ) -> (u32, Option<Vec<Vec3>>) {
+        work.resize(x.len());
+        let mut tried = 0;
+        for kind in [HessianKind::Exact, HessianKind::Psd] {
+            tried += 1;
+            self.derivatives(x, kind, Some(way), assembler, &mut work.gradient);
+            for (m, g) in work.negative.iter_mut().zip(&work.gradient) {
+                *m = -g;
+            }
+            let matrix = assembler.matrix();
+            let solved = linear
+                .prepare(matrix)
+                .and_then(|()| linear.solve(matrix, &work.negative, &mut work.direction, 0.0));
+            if solved.is_ok() {
+                // the rows of fixed vertices have no answer
+                let moved = x.iter().zip(way).zip(&work.direction);
+                return (tried, Some(moved.map(|((x, w), d)| x + w + d).collect()));
+            }
+        }
+        (tried, None)
+    }
+
+    /// Whether `Phi` is convex around `x`: whether its exact Hessian has a Cholesky factor.
+    pub fn is_convex(
+        &self,
+        x: &[Vec3],
+        assembler: &mut Assembler,
+        linear: &mut dyn LinearSolver,
+        work: &mut Work,
+    ) -> bool {
+        work.resize(x.len());
+        self.derivatives(x, HessianKind::Exact, None, assembler, &mut work.gradient);
+        linear.prepare(assembler.matrix()).is_ok()
+    }
+
     /// Minimises `Phi` from `x`, which holds the best admissible point on return.
     pub fn minimise(
         &self,
@@ -186,14 +260,7 @@ impl Problem<'_> {
         work: &mut Work,
     ) -> Result<Summary> {
         let n = x.len();
-        for v in [
-            &mut work.gradient,
-            &mut work.negative,
-            &mut work.direction,
-            &mut work.trial,
-        ] {
-            v.resize(n, Vec3::zeros());
-        }
+        work.resize(n);
         let mut summary = Summary::default();
         let mut value = self.value(x);
         if !value.is_finite() {
@@ -210,7 +277,7 @@ impl Problem<'_> {
                 } else {
                     HessianKind::Part(exactness)
                 };
-                let still = self.derivatives(x, kind, assembler, &mut work.gradient);
+                let still = self.derivatives(x, kind, None, assembler, &mut work.gradient);
                 summary.residual = largest(&work.gradient);
                 if iteration == 0 {
                     summary.static_residual = still;
@@ -243,6 +310,10 @@ impl Problem<'_> {
                     }
                     // not positive definite: less of the exact Hessian
                     Err(_) if kept => linear.forget(),
+                    Err(_) if tolerance.strict => {
+                        summary.indefinite = true;
+                        return Ok(summary);
+                    }
                     Err(_) if exactness > 0.0 => {
                         exactness = if exactness > 0.3 {
                             0.5 * exactness
@@ -254,6 +325,7 @@ impl Problem<'_> {
                 }
             }
             summary.iterations += 1;
+            summary.corrections += 1;
             let slope: f64 = dot(&work.gradient, &work.direction);
             let reach = largest(&work.direction);
             if !slope.is_finite() || !reach.is_finite() {
@@ -282,7 +354,9 @@ impl Problem<'_> {
             }
             summary.last_length = length;
             summary.moved = length * reach;
-            exactness = if length < 1.0 {
+            exactness = if tolerance.strict {
+                exactness
+            } else if length < 1.0 {
                 0.0
             } else {
                 (2.0 * exactness).max(0.25).min(tolerance.most_exactness)

@@ -6,6 +6,7 @@
 //! full, so that near rest the inertia fades and the iteration becomes Newton's method for the
 //! static problem.
 
+use super::drift::Drift;
 use super::engine::{Attempt, Engine, Motion};
 use super::step::Totals;
 use crate::error::{Error, Result, Status};
@@ -25,17 +26,32 @@ pub struct RelaxOptions {
     pub first_step: f64,
     /// Largest step size [s].
     pub largest_step: f64,
+    /// Whether the start is disturbed a little, as a plane sheet needs it.
+    pub disturbed: bool,
+}
+
+/// Why a relaxation ended.
+#[derive(Clone, Debug, PartialEq)]
+pub enum End {
+    /// A tolerance was met.
+    Rest,
+    /// All steps allowed were taken.
+    Limit,
+    /// The host asked to stop.
+    Cancelled,
+    /// No step, however short, leads lower, for this reason.
+    Stalled(String),
+    /// A part of the cloth, which has this panel, falls and will meet nothing.
+    Falling(u32),
 }
 
 /// How a relaxation ended.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Relaxed {
     /// Sums.
     pub totals: Totals,
-    /// A tolerance was met.
-    pub converged: bool,
-    /// The host asked to stop.
-    pub cancelled: bool,
+    /// Why.
+    pub end: End,
 }
 
 /// Smallest step of a relaxation before it gives up [s].
@@ -59,9 +75,9 @@ pub fn relax(
 ) -> Result<Relaxed> {
     let mut out = Relaxed {
         totals: Totals::default(),
-        converged: false,
-        cancelled: false,
+        end: End::Limit,
     };
+    let mut drift = Drift::new(&engine.system, state);
     out.totals.residual = f64::INFINITY;
     let mut h = options.first_step;
     let mut kinetic = [0.0; 2];
@@ -70,7 +86,9 @@ pub fn relax(
     let mut moved = f64::INFINITY;
     let (mut wait, mut patience) = (4_u32, 4_u32);
     state.velocities.fill(Vec3::zeros());
-    disturb(state, IMPERFECTION * engine.system.mean_edge());
+    if options.disturbed {
+        disturb(state, IMPERFECTION * engine.system.mean_edge());
+    }
     while out.totals.substeps < options.max_steps {
         let exact = wait == 0 && moved < NEAR * engine.system.mean_edge();
         // near rest friction is frozen while Newton's method converges: anchors that move after
@@ -113,7 +131,11 @@ pub fn relax(
                 if !out.totals.residual.is_finite() {
                     return Err(Error::new(Status::NoAdmissibleState, reason));
                 }
-                out.converged = out.totals.residual <= options.force_tolerance;
+                out.end = if out.totals.residual <= options.force_tolerance {
+                    End::Rest
+                } else {
+                    End::Stalled(reason)
+                };
                 return Ok(out);
             }
             continue;
@@ -137,19 +159,23 @@ pub fn relax(
         if options.seam_gap > 0.0
             && engine.system.largest_seam_gap(&state.positions) <= options.seam_gap
         {
-            out.converged = true;
+            out.end = End::Rest;
             return Ok(out);
         }
         if summary.static_residual <= options.force_tolerance {
             engine.follow(state)?;
             out.totals.residual = engine.residual(state)?;
             if out.totals.residual <= options.force_tolerance {
-                out.converged = true;
+                out.end = End::Rest;
                 return Ok(out);
             }
         }
+        if let Some(vertex) = drift.lost(engine, state, options.force_tolerance)? {
+            out.end = End::Falling(engine.system.panel_of(vertex));
+            return Ok(out);
+        }
         if !watch(out.totals.substeps, summary.static_residual) {
-            out.cancelled = true;
+            out.end = End::Cancelled;
             return Ok(out);
         }
     }

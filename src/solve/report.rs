@@ -14,6 +14,12 @@ pub enum Outcome {
     IterationLimit = 2,
     /// The host asked to stop; the state is admissible.
     Cancelled = 3,
+    /// A drape ended where no step, however short, leads lower; the state is admissible, the
+    /// residual and the reason are in the report.
+    Stalled = 4,
+    /// Nothing holds a part of the garment and nothing lies on its way: a drape of it would never
+    /// end. The state is that at which this was seen, the reason names the part.
+    Falling = 5,
 }
 
 impl Outcome {
@@ -24,15 +30,19 @@ impl Outcome {
             Self::Substepped => "substepped",
             Self::IterationLimit => "iteration_limit",
             Self::Cancelled => "cancelled",
+            Self::Stalled => "stalled",
+            Self::Falling => "falling",
         }
     }
 }
 
 /// Numbers of one `step` or `drape`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StepReport {
     /// Why it stopped.
     pub outcome: Outcome,
+    /// What there is to say of that, for people; empty where the outcome says it all.
+    pub reason: String,
     /// Newton iterations, all substeps together.
     pub newton_iterations: u64,
     /// Iterations of the linear solver, all together; a direct solve counts one.

@@ -3,9 +3,10 @@
 
 use crate::error::{Error, Result};
 use crate::system::build::BuildOptions;
+use crate::system::yarn::contacts::Sliding;
 
 macro_rules! settings {
-    ($($(#[doc = $doc:literal])+ $field:ident: $name:literal = $default:expr, $min:expr, $max:expr, $unit:literal;)*) => {
+    ($($(#[doc = $doc:literal])+ $field:ident: $name:literal = $default:expr, $min:expr, $max:expr, $unit:literal $($whole:ident)?;)*) => {
         /// Numbers that steer the solvers.
         #[derive(Clone, Debug, PartialEq)]
         pub struct Settings {
@@ -22,6 +23,7 @@ macro_rules! settings {
             /// Every tunable.
             pub const KEYS: &'static [Key] = &[
                 $(Key { name: $name, default: $default, min: $min, max: $max, unit: $unit,
+                        whole: !concat!($(stringify!($whole),)?).is_empty(),
                         doc: concat!($($doc,)+) },)*
             ];
 
@@ -33,11 +35,22 @@ macro_rules! settings {
                 }
             }
 
+            /// All that results depend on, by name.
+            pub fn that_matter(&self) -> Vec<(String, f64)> {
+                let all = [$(self.$field,)*];
+                let pairs = Self::KEYS.iter().zip(all).filter(|(key, _)| key.matters());
+                pairs.map(|(key, value)| (key.name.to_owned(), value)).collect()
+            }
+
             /// Sets a value by dotted name; unknown names and values out of range are refused.
             pub fn set(&mut self, name: &str, value: f64) -> Result<()> {
+                let Some(key) = Self::KEYS.iter().find(|k| k.name == name) else {
+                    return Err(Error::argument(format!("'{name}' is not the name of a number; `toile schema` lists them")));
+                };
+                key.check(value)?;
                 match name {
-                    $($name => { self.$field = in_range(name, value, $min, $max)?; })*
-                    _ => return Err(Error::argument(format!("'{name}' is not the name of a number; `toile schema` lists them"))),
+                    $($name => self.$field = value,)*
+                    _ => {}
                 }
                 Ok(())
             }
@@ -58,22 +71,41 @@ pub struct Key {
     pub max: f64,
     /// SI unit, or "1".
     pub unit: &'static str,
+    /// Whether it is a whole number.
+    pub whole: bool,
     /// Meaning.
     pub doc: &'static str,
 }
 
-fn in_range(name: &str, value: f64, min: f64, max: f64) -> Result<f64> {
-    if value.is_nan() || value < min || value > max {
-        return Err(Error::argument(format!(
-            "{name} = {value} must lie in [{min}, {max}]"
-        )));
+/// Tunables on which no bit of a result depends.
+const WITHOUT_EFFECT: [&str; 2] = ["solver.threads", "limits.vertices"];
+
+impl Key {
+    /// Whether results depend on it.
+    pub fn matters(&self) -> bool {
+        !WITHOUT_EFFECT.contains(&self.name)
     }
-    Ok(value)
+
+    /// Refuses a value out of range, and a fraction where a whole number is asked for.
+    pub fn check(&self, value: f64) -> Result<()> {
+        let Self { name, min, max, .. } = self;
+        if !(*min..=*max).contains(&value) {
+            return Err(Error::argument(format!(
+                "{name} = {value} must lie in [{min}, {max}]"
+            )));
+        }
+        if self.whole && value.fract() != 0.0 {
+            return Err(Error::argument(format!(
+                "{name} = {value} must be a whole number"
+            )));
+        }
+        Ok(())
+    }
 }
 
 settings! {
     /// Newton iterations allowed in one substep before it is cut.
-    newton_max_iterations: "solver.newton.max_iterations" = 30.0, 1.0, 10_000.0, "1";
+    newton_max_iterations: "solver.newton.max_iterations" = 30.0, 1.0, 10_000.0, "1" whole;
     /// A substep has converged when the largest Newton correction, over the substep size, is below this speed.
     newton_velocity_tolerance: "solver.newton.velocity_tolerance" = 1e-3, 1e-12, 1e3, "m/s";
     /// A substep has also converged when the last Newton iteration has lowered the incremental potential by no more than this part of what all of them have. 0 asks for the velocity tolerance alone.
@@ -85,29 +117,35 @@ settings! {
     /// A drape is at rest when no free vertex carries a larger residual force.
     drape_force_tolerance: "solver.drape.force_tolerance" = 1e-5, 1e-14, 1e6, "N";
     /// Pseudo time steps allowed in a drape, on each level.
-    drape_max_steps: "solver.drape.max_steps" = 2000.0, 1.0, 1e7, "1";
+    drape_max_steps: "solver.drape.max_steps" = 2000.0, 1.0, 1e7, "1" whole;
     /// Coarse levels used by a drape from the flat panels, 0 for none.
-    drape_levels: "solver.drape.levels" = 1.0, 0.0, 4.0, "1";
+    drape_levels: "solver.drape.levels" = 1.0, 0.0, 4.0, "1" whole;
     /// Linear solver: 0 chooses for each matrix, 1 sparse Cholesky, 2 conjugate gradients with block Jacobi, 3 with incomplete Cholesky, 4 with the Cholesky factor of an earlier matrix.
-    linear_kind: "solver.linear.kind" = 0.0, 0.0, 4.0, "1";
+    linear_kind: "solver.linear.kind" = 0.0, 0.0, 4.0, "1" whole;
     /// Relative residual at which conjugate gradients stop.
     linear_tolerance: "solver.linear.tolerance" = 1e-3, 1e-14, 0.5, "1";
     /// Worker threads; results do not depend on it.
-    threads: "solver.threads" = 1.0, 1.0, 256.0, "1";
+    threads: "solver.threads" = 1.0, 1.0, 256.0, "1" whole;
     /// Cloth against cloth contact: 1 on, 0 off.
-    self_contact: "contact.self.enabled" = 1.0, 0.0, 1.0, "1";
+    self_contact: "contact.self.enabled" = 1.0, 0.0, 1.0, "1" whole;
     /// Stiffness of cloth against cloth, pressure per depth.
     self_stiffness: "contact.self.stiffness" = 1e6, 0.0, 1e12, "Pa/m";
     /// Stiffness of the seam springs per length of seam.
     seam_stiffness: "seam.stiffness" = 2e5, 1.0, 1e12, "N/m^2";
     /// Largest force with which an open seam is pulled together, per length of seam.
     seam_pull: "seam.pull" = 50.0, 1e-3, 1e6, "N/m";
+    /// Where yarns may slide through contacts: 0 nowhere, 1 where friction does not hold them, 2 everywhere, friction being a stiff spring where it holds.
+    yarn_sliding: "yarn.sliding" = 1.0, 0.0, 2.0, "1" whole;
+    /// Inertia forces of yarn that slides: 1 on, 0 off.
+    yarn_inertia: "yarn.inertia_forces" = 1.0, 0.0, 1.0, "1" whole;
     /// Quadratic drag of the air along the normal, times density of air.
     air_drag: "air.drag" = 1.2, 0.0, 1e3, "kg/m^3";
     /// Tangential drag (skin friction) of the air, times density of air.
     air_lift: "air.tangential" = 0.06, 0.0, 1e3, "kg/m^3";
     /// Largest number of vertices that a garment may have.
-    max_vertices: "limits.vertices" = 2e6, 3.0, 1e8, "1";
+    max_vertices: "limits.vertices" = 2e6, 3.0, 1e8, "1" whole;
+    /// Largest number of yarn nodes that a garment may have.
+    max_yarn_nodes: "limits.yarn_nodes" = 5e6, 1.0, 1e8, "1" whole;
 }
 
 impl From<&Settings> for BuildOptions {
@@ -120,6 +158,12 @@ impl From<&Settings> for BuildOptions {
             air_tangential: s.air_lift,
             self_contact: s.self_contact > 0.5,
             self_stiffness: s.self_stiffness,
+            sliding: match s.yarn_sliding as u32 {
+                0 => Sliding::Nowhere,
+                1 => Sliding::WhereSlipping,
+                _ => Sliding::Everywhere,
+            },
+            inertia_forces: s.yarn_inertia > 0.5,
         }
     }
 }

@@ -19,20 +19,41 @@ pub struct Totals {
     pub cut: bool,
 }
 
-/// Advances the state by exactly `dt` [s], or returns an error with the state untouched.
-pub fn step(engine: &mut Engine, state: &mut State, dt: f64) -> Result<Totals> {
+/// Asked before every substep: fraction of the step that is done, residual; false stops.
+pub type Watch<'a> = dyn FnMut(f64, f64) -> bool + 'a;
+
+/// Advances the state by exactly `dt` [s] and returns what it took. The state is untouched after an
+/// error, and after a stop by the host, which is `None`.
+pub fn step(
+    engine: &mut Engine,
+    state: &mut State,
+    dt: f64,
+    watch: &mut Watch<'_>,
+) -> Result<Option<Totals>> {
     let saved = state.clone();
     engine.begin();
-    advance(engine, state, dt).inspect_err(|_| state.clone_from(&saved))
+    let done = advance(engine, state, dt, watch);
+    if !matches!(done, Ok(Some(_))) {
+        state.clone_from(&saved);
+    }
+    done
 }
 
-fn advance(engine: &mut Engine, state: &mut State, dt: f64) -> Result<Totals> {
+fn advance(
+    engine: &mut Engine,
+    state: &mut State,
+    dt: f64,
+    watch: &mut Watch<'_>,
+) -> Result<Option<Totals>> {
     let end = state.time + dt;
     let start = state.time;
     let (min, max) = (engine.settings.min_step, engine.settings.max_step);
     let mut totals = Totals::default();
     let mut remaining = dt;
     while remaining > 0.0 {
+        if !watch(1.0 - remaining / dt, totals.residual) {
+            return Ok(None);
+        }
         let slices = (remaining / state.step_size.min(max)).ceil().max(1.0);
         let h = remaining / slices;
         let attempt = engine.attempt(state, h, 1.0 / slices, Motion::Dynamic);
@@ -78,7 +99,7 @@ fn advance(engine: &mut Engine, state: &mut State, dt: f64) -> Result<Totals> {
     for body in &mut state.bodies {
         body.moved_with_time = true;
     }
-    Ok(totals)
+    Ok(Some(totals))
 }
 
 fn add(totals: &mut Totals, summary: &super::newton::Summary) {

@@ -115,6 +115,10 @@ impl Term for Air {
         out.fill(block);
     }
 
+    fn is_idle(&self, at: &Configuration<'_>) -> bool {
+        at.inv_dt == 0.0 && at.world.wind == Vec3::zeros()
+    }
+
     fn is_internal(&self) -> bool {
         false
     }

@@ -94,32 +94,39 @@ impl Assembler {
             let largest = (BATCH_BLOCKS / block_count).max(1);
             for first in (0..count).step_by(largest) {
                 let batch = largest.min(count - first);
-                workers.chunks(
-                    &mut self.gradients[..batch * arity],
-                    CHUNK * arity,
-                    |c, chunk| {
+                let kind = hessian.filter(|kind| term.has_hessian(*kind));
+                let gradients = &mut self.gradients[..batch * arity];
+                let blocks = &mut self.blocks[..batch * block_count];
+                match kind {
+                    Some(kind) => workers.chunks_of_two(
+                        (gradients, CHUNK * arity),
+                        (blocks, CHUNK * block_count),
+                        |c, gradients, blocks| {
+                            let stencils = gradients.chunks_mut(arity);
+                            for (k, (g, h)) in
+                                stencils.zip(blocks.chunks_mut(block_count)).enumerate()
+                            {
+                                term.derivatives(first + c * CHUNK + k, at, kind, g, h);
+                            }
+                        },
+                    ),
+                    None => workers.chunks(gradients, CHUNK * arity, |c, chunk| {
                         for (k, g) in chunk.chunks_mut(arity).enumerate() {
                             term.gradient(first + c * CHUNK + k, at, g);
                         }
-                    },
-                );
+                    }),
+                }
                 for k in 0..batch {
                     let vertices = stencils.get(first + k);
                     for (v, g) in vertices.iter().zip(&self.gradients[k * arity..]) {
                         out[*v as usize] += g;
                     }
                 }
-                let Some(kind) = hessian.filter(|_| !term.is_linear()) else {
+                if kind.is_none() {
                     continue;
-                };
-                let buffer = &mut self.blocks[..batch * block_count];
-                workers.chunks(buffer, CHUNK * block_count, |c, chunk| {
-                    for (k, h) in chunk.chunks_mut(block_count).enumerate() {
-                        term.hessian(first + c * CHUNK + k, at, kind, h);
-                    }
-                });
+                }
                 let slots = &self.plans[t][first * block_count..(first + batch) * block_count];
-                for (slot, block) in slots.iter().zip(buffer.iter()) {
+                for (slot, block) in slots.iter().zip(&self.blocks) {
                     let target = &mut self.matrix.blocks[(slot & !TRANSPOSED) as usize];
                     if slot & TRANSPOSED == 0 {
                         *target += block;

@@ -108,6 +108,7 @@ pub(super) fn rigidity(f: &Fabric) -> Vec3 {
 
 /// Local vertices `[centre, neighbour, next, previous]` of hinge `k` of a fan with `ring`
 /// neighbours: a hinge as in [`crate::math::geometry`].
+#[inline]
 fn local_hinge(k: usize, ring: usize, kind: FanKind) -> [usize; 4] {
     let at = if kind == FanKind::Closed { k } else { k + 1 };
     let next = if at + 1 == ring { 0 } else { at + 1 };
@@ -149,10 +150,12 @@ fn stiffness_rate(m: &Measure, dm: &Measure, d: &Vec3, dd: &Vec3, kind: FanKind)
 }
 
 impl FanRest {
+    #[inline]
     pub(super) fn hinge_count(&self) -> usize {
         self.measure.weights.len()
     }
 
+    #[inline]
     pub(super) fn local_hinge(&self, k: usize) -> [usize; 4] {
         local_hinge(k, self.uv.len() - 1, self.kind)
     }

@@ -69,6 +69,16 @@ impl BodySet {
         self.entries.get(body).map(|e| &e.end)
     }
 
+    /// Puts a deformed body at `vertices` in, for a state that has them: made once, not again by
+    /// [`BodySet::prepare`].
+    pub fn place(&mut self, body: usize, deformed: Body, vertices: &[Vec3]) {
+        let entry = &mut self.entries[body];
+        entry.end = deformed.clone();
+        entry.start = deformed;
+        entry.start_vertices = vertices.to_vec();
+        entry.end_vertices = vertices.to_vec();
+    }
+
     /// The same bodies with the friction of each multiplied by `factor`.
     #[must_use]
     pub fn with_friction(&self, factor: f64) -> Self {
@@ -127,6 +137,12 @@ impl BodySet {
                 body.target_vertices.clear();
             }
         }
+    }
+
+    /// Whether a body moves or changes its shape over the substep.
+    pub fn is_moving(&self, body: usize) -> bool {
+        let entry = &self.entries[body];
+        entry.from != entry.to || entry.start_vertices != entry.end_vertices
     }
 
     /// Length of the path of a point over the substep, seen from the body; infinite for a body that
@@ -204,13 +220,7 @@ impl Bodies for BodySet {
 
     fn distance(&self, body: usize, point: &Vec3) -> Distance {
         let entry = &self.entries[body];
-        let d = entry.end.distance(&entry.to.to_body(point));
-        let r = entry.to.rotation.to_rotation_matrix();
-        Distance {
-            value: d.value,
-            gradient: r * d.gradient,
-            hessian: r.matrix() * d.hessian * r.matrix().transpose(),
-        }
+        distance(&entry.end, &entry.to, point)
     }
 
     fn value(&self, body: usize, point: &Vec3) -> f64 {
@@ -235,6 +245,43 @@ impl Bodies for BodySet {
 
     fn contact(&self, body: usize) -> &ContactSettings {
         &self.entries[body].contact
+    }
+}
+
+/// The bodies as they are at the start of the substep.
+pub struct AtStart<'a>(pub &'a BodySet);
+
+impl Bodies for AtStart<'_> {
+    fn count(&self) -> usize {
+        self.0.count()
+    }
+
+    fn distance(&self, body: usize, point: &Vec3) -> Distance {
+        let entry = &self.0.entries[body];
+        distance(&entry.start, &entry.from, point)
+    }
+
+    fn value(&self, body: usize, point: &Vec3) -> f64 {
+        self.0.value_at_start(body, point)
+    }
+
+    fn carried(&self, _: usize, point: &Vec3) -> Vec3 {
+        *point
+    }
+
+    fn contact(&self, body: usize) -> &ContactSettings {
+        self.0.contact(body)
+    }
+}
+
+/// Distance to a body in a pose, derivatives by world coordinates.
+fn distance(body: &Body, pose: &Pose, point: &Vec3) -> Distance {
+    let d = body.distance(&pose.to_body(point));
+    let r = pose.rotation.to_rotation_matrix();
+    Distance {
+        value: d.value,
+        gradient: r * d.gradient,
+        hessian: r.matrix() * d.hessian * r.matrix().transpose(),
     }
 }
 

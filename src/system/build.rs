@@ -14,23 +14,28 @@ use super::quadratic_bending::QuadraticBending;
 use super::seam_term::{SeamHinge, SeamSprings};
 use super::state::State;
 use super::term::{Bodies, Term};
-use super::yarn::Unknowns;
+use super::yarn::contacts::{Contacts, Sliding};
+use super::yarn::unknowns::Unknowns;
+use super::yarn::{self, YarnOptions};
 use crate::cloth::Cloth;
 use crate::error::Result;
+use crate::math::parallel::Workers;
 use crate::math::{Vec3, topology};
 use crate::yarn::Yarns;
+use std::sync::Arc;
 
 /// A compiled garment.
 pub struct System {
     /// Rest data of the triangle part.
     pub cloth: Cloth,
     /// Rest data of the yarns, if there are any.
-    pub yarns: Option<Yarns>,
+    pub yarns: Option<Arc<Yarns>>,
     /// Vertices and nodes.
     pub points: Points,
     /// Blocks of the yarns' unknowns, after those of the vertices.
     pub unknowns: Unknowns,
     sliding: Vec<bool>,
+    contacts: Option<Contacts>,
     /// Energies.
     pub terms: Vec<Box<dyn Term>>,
     /// Bodies of the world.
@@ -59,6 +64,20 @@ pub struct BuildOptions {
     pub self_contact: bool,
     /// Its stiffness [Pa/m].
     pub self_stiffness: f64,
+    /// Where yarns may slide.
+    pub sliding: Sliding,
+    /// Whether sliding material has inertia forces.
+    pub inertia_forces: bool,
+}
+
+impl From<&BuildOptions> for YarnOptions {
+    fn from(options: &BuildOptions) -> Self {
+        Self {
+            tie_stiffness: options.seam_stiffness,
+            inertia_forces: options.inertia_forces,
+            ..Self::default()
+        }
+    }
 }
 
 impl System {
@@ -68,11 +87,20 @@ impl System {
     }
 
     /// Compiles a garment whose yarns are simulated where the cloth has no triangles.
-    pub fn with_yarns(cloth: Cloth, yarns: Option<Yarns>, options: &BuildOptions) -> Result<Self> {
-        let points = Points::new(&cloth, yarns.as_ref());
+    pub fn with_yarns(
+        cloth: Cloth,
+        yarns: Option<Arc<Yarns>>,
+        options: &BuildOptions,
+    ) -> Result<Self> {
+        let points = Points::new(&cloth, yarns.as_deref());
         let sliding = vec![false; yarns.as_ref().map_or(0, |y| y.mesh.incidences.len())];
-        let unknowns = unknowns(&cloth, yarns.as_ref(), &sliding)?;
-        let terms = terms(&cloth, &points, yarns.as_ref(), options)?;
+        let unknowns = unknowns(&cloth, yarns.as_deref(), &sliding)?;
+        let yarn_options = YarnOptions::from(options);
+        let contacts = yarns
+            .clone()
+            .map(|y| Contacts::new(y, &yarn_options))
+            .transpose()?;
+        let terms = terms(&cloth, &points, yarns.as_deref(), &unknowns, options)?;
         let edges = topology::edges(&cloth.mesh.triangles);
         let rest_lengths = edges
             .iter()
@@ -84,6 +112,7 @@ impl System {
             points,
             unknowns,
             sliding,
+            contacts,
             terms,
             bodies: BodySet::default(),
             edges,
@@ -95,7 +124,13 @@ impl System {
     /// Takes changed options; terms that carry them are built anew.
     pub fn set_options(&mut self, options: &BuildOptions) -> Result<()> {
         if *options != self.options {
-            self.terms = terms(&self.cloth, &self.points, self.yarns.as_ref(), options)?;
+            self.terms = terms(
+                &self.cloth,
+                &self.points,
+                self.yarns.as_deref(),
+                &self.unknowns,
+                options,
+            )?;
             self.options = options.clone();
         }
         Ok(())
@@ -111,16 +146,24 @@ impl System {
         if *sliding == *self.sliding {
             return Ok(false);
         }
-        self.unknowns = unknowns(&self.cloth, self.yarns.as_ref(), sliding)?;
+        self.unknowns = unknowns(&self.cloth, self.yarns.as_deref(), sliding)?;
         self.sliding.clear();
         self.sliding.extend_from_slice(sliding);
         self.terms = terms(
             &self.cloth,
             &self.points,
-            self.yarns.as_ref(),
+            self.yarns.as_deref(),
+            &self.unknowns,
             &self.options,
         )?;
         Ok(true)
+    }
+
+    /// After an accepted step: the normal forces of the yarns' contacts, and what slides next.
+    pub fn follow_contacts(&mut self, state: &mut State, workers: &Workers) {
+        if let Some(contacts) = &mut self.contacts {
+            contacts.follow(self.options.sliding, state, workers);
+        }
     }
 
     /// Values of all blocks in a state.
@@ -162,8 +205,57 @@ impl System {
         (2.0 * self.bodies.contact(body).thickness).max(4e-3)
     }
 
-    /// Mean rest length of the edges [m].
+    /// Panel of a point.
+    pub fn panel_of(&self, point: u32) -> u32 {
+        let p = point as usize;
+        match (&self.yarns, p.checked_sub(self.points.vertex_count)) {
+            (Some(yarns), Some(node)) => yarns.mesh.node_panel[node],
+            _ => self.cloth.mesh.vertex_panel[p],
+        }
+    }
+
+    /// Points of each part that hangs together by triangles, yarns and seams, parts by their first
+    /// point. Points that do not move by themselves belong to none.
+    pub fn parts(&self) -> Vec<Vec<u32>> {
+        let mesh = &self.cloth.mesh;
+        let mut root: Vec<u32> = (0..self.points.count() as u32).collect();
+        let links = mesh.seams.iter().flat_map(|s| &s.links);
+        let sewn = links.flat_map(|l| [[l.vertex, l.edge[0]], [l.vertex, l.edge[1]]]);
+        let node = |n| self.unknowns.node(n);
+        let yarns = self.yarns.iter().flat_map(|y| {
+            let ties = y.mesh.ties.iter().map(|t| [t.node, t.segment[0]]);
+            (0..y.mesh.yarn_count())
+                .flat_map(|k| y.mesh.yarn(k).windows(2))
+                .map(|pair| [pair[0].node, pair[1].node])
+                .chain(ties)
+                .map(|pair| pair.map(node))
+        });
+        for [a, b] in self.edges.iter().copied().chain(sewn).chain(yarns) {
+            let (a, b) = (find(&mut root, a), find(&mut root, b));
+            root[a.max(b) as usize] = a.min(b);
+        }
+        let mut parts: Vec<Vec<u32>> = Vec::new();
+        let mut place = vec![0; root.len()];
+        for v in (0..root.len() as u32).filter(|v| self.points.moves(*v as usize)) {
+            let top = find(&mut root, v);
+            if top == v {
+                place[v as usize] = parts.len();
+                parts.push(Vec::new());
+            }
+            parts[place[top as usize]].push(v);
+        }
+        parts
+    }
+
+    /// Mean rest length of the edges, of the yarns' segments where there are no triangles [m].
     pub fn mean_edge(&self) -> f64 {
+        if let (true, Some(yarns)) = (self.edges.is_empty(), &self.yarns) {
+            let mesh = &yarns.mesh;
+            let length: f64 = (0..mesh.yarn_count())
+                .filter_map(|y| Some(mesh.yarn(y).last()?.u - mesh.yarn(y).first()?.u))
+                .sum();
+            return length / (mesh.incidences.len() - mesh.yarn_count()).max(1) as f64;
+        }
         self.rest_lengths.iter().sum::<f64>() / self.rest_lengths.len().max(1) as f64
     }
 
@@ -190,27 +282,43 @@ impl System {
         (sum / self.edges.len().max(1) as f64).sqrt()
     }
 
-    /// Largest relative stretch (or shortening, as a positive number, is not counted) of an edge.
-    pub fn largest_strain(&self, x: &[Vec3]) -> f64 {
-        self.edges
-            .iter()
+    /// Largest relative stretch of an edge or of a yarn's segment; shortening is not counted.
+    pub fn largest_strain(&self, state: &State) -> f64 {
+        let x = &state.positions;
+        let edges = (self.edges.iter())
             .zip(&self.rest_lengths)
             .map(|(e, rest)| (x[e[1] as usize] - x[e[0] as usize]).norm() / rest - 1.0)
-            .fold(0.0, f64::max)
+            .fold(0.0, f64::max);
+        let Some(yarns) = &self.yarns else {
+            return edges;
+        };
+        let mesh = &yarns.mesh;
+        (0..mesh.yarn_count())
+            .flat_map(|y| mesh.starts[y] as usize + 1..mesh.starts[y + 1] as usize)
+            .map(|i| {
+                let [a, b] = [i - 1, i].map(|i| {
+                    let node = self.unknowns.node(mesh.incidences[i].node);
+                    (x[node as usize], state.u[i])
+                });
+                (b.0 - a.0).norm() / (b.1 - a.1) - 1.0
+            })
+            .fold(edges, f64::max)
     }
 
-    /// Largest distance between the two points of a seam link [m].
+    /// Largest distance between the two points of a seam link or of a yarn end and its rod [m].
     pub fn largest_seam_gap(&self, x: &[Vec3]) -> f64 {
-        self.cloth
-            .mesh
-            .seams
-            .iter()
-            .flat_map(|s| &s.links)
-            .map(|l| {
-                let [a, b] = l.edge.map(|v| x[v as usize]);
-                (x[l.vertex as usize] - a.lerp(&b, l.t)).norm()
-            })
-            .fold(0.0, f64::max)
+        let gap = |point: u32, ends: [u32; 2], t: f64| {
+            let [a, b] = ends.map(|v| x[v as usize]);
+            (x[point as usize] - a.lerp(&b, t)).norm()
+        };
+        let links = self.cloth.mesh.seams.iter().flat_map(|s| &s.links);
+        let sewn = links
+            .map(|l| gap(l.vertex, l.edge, l.t))
+            .fold(0.0, f64::max);
+        let node = |n| self.unknowns.node(n);
+        let ties = self.yarns.iter().flat_map(|y| &y.mesh.ties);
+        ties.map(|t| gap(node(t.node), t.segment.map(node), t.t))
+            .fold(sewn, f64::max)
     }
 
     /// Smallest signed distance of a vertex to a body [m], infinite without bodies.
@@ -223,6 +331,17 @@ impl System {
         }
         gap
     }
+}
+
+/// The vertex that stands for the part of `v`.
+fn find(root: &mut [u32], v: u32) -> u32 {
+    let mut top = v;
+    while root[top as usize] != top {
+        // halves the way for those who come later
+        root[top as usize] = root[root[top as usize] as usize];
+        top = root[top as usize];
+    }
+    top
 }
 
 fn unknowns(cloth: &Cloth, yarns: Option<&Yarns>, sliding: &[bool]) -> Result<Unknowns> {
@@ -238,6 +357,7 @@ fn terms(
     cloth: &Cloth,
     points: &Points,
     yarns: Option<&Yarns>,
+    unknowns: &Unknowns,
     options: &BuildOptions,
 ) -> Result<Vec<Box<dyn Term>>> {
     let mut terms: Vec<Box<dyn Term>> = vec![
@@ -268,6 +388,9 @@ fn terms(
         )));
     }
     terms.push(Box::new(Pressure::new(cloth)));
+    if let Some(Yarns { mesh, materials }) = yarns {
+        terms.extend(yarn::terms(mesh, materials, unknowns, &options.into())?);
+    }
     if options.self_contact {
         let friction = cloth.fabrics.iter().map(|f| f.friction).fold(0.0, f64::max);
         terms.push(Box::new(SelfContact::new(

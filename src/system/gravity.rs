@@ -51,8 +51,8 @@ impl Term for Gravity {
         "gravity"
     }
 
-    fn is_linear(&self) -> bool {
-        true
+    fn has_hessian(&self, _: HessianKind) -> bool {
+        false
     }
 
     fn stencils(&self) -> Stencils<'_> {

@@ -28,6 +28,7 @@ pub struct Hinge {
     rest_angles: Vec<[f64; MAX_HINGES]>,
 }
 
+#[inline]
 fn gather(fan: &FanRest, k: usize, vertices: &[u32], x: &[Vec3]) -> ([usize; 4], [Vec3; 4]) {
     let local = fan.local_hinge(k);
     let at = |i: usize| x[vertices[local[i]] as usize];
@@ -133,6 +134,66 @@ impl Hinge {
     }
 }
 
+/// Derivatives of the angles of a fan's hinges by their four vertices [1/m].
+type AngleGradients = [[Vec3; 4]; MAX_HINGES];
+
+impl Hinge {
+    fn angle_gradients(&self, e: usize, at: &Configuration<'_>) -> AngleGradients {
+        let (fan, vertices) = (&self.group.fans[e], self.vertices(e));
+        let mut out = [[Vec3::zeros(); 4]; MAX_HINGES];
+        for (k, angle) in out.iter_mut().enumerate().take(fan.hinge_count()) {
+            *angle = dihedral_gradient(&gather(fan, k, vertices, at.x).1, fan.floor);
+        }
+        out
+    }
+
+    /// Hessian of fan `e` with the derivative `moment` of its energy by `r`.
+    fn curvature(
+        &self,
+        e: usize,
+        at: &Configuration<'_>,
+        kind: HessianKind,
+        angles: &AngleGradients,
+        moment: &Vec3,
+        out: &mut [Mat3],
+    ) {
+        let (fan, vertices) = (&self.group.fans[e], self.vertices(e));
+        let arity = self.group.arity;
+        let weights = &fan.measure.weights;
+        // rows: components of r
+        let mut b = [Mat3::zeros(); MAX_ARITY];
+        for (k, weight) in weights.iter().enumerate() {
+            for (i, g) in fan.local_hinge(k).into_iter().zip(&angles[k]) {
+                b[i] += weight * g.transpose();
+            }
+        }
+        let d = fan.stiffness * (1.0 + fan.damping * at.inv_dt);
+        for i in 0..arity {
+            let left = b[i].transpose() * d;
+            for j in 0..=i {
+                out[i * (i + 1) / 2 + j] = left * b[j];
+            }
+        }
+        let exactness = kind.exactness();
+        if exactness == 0.0 {
+            return;
+        }
+        let moment = moment * exactness;
+        for (k, weight) in weights.iter().enumerate() {
+            let (local, x) = gather(fan, k, vertices, at.x);
+            let f = weight.dot(&moment);
+            let h = dihedral_hessian(&x, fan.floor);
+            for (p, &i) in local.iter().enumerate() {
+                for (q, &j) in local.iter().enumerate() {
+                    if j <= i {
+                        out[i * (i + 1) / 2 + j] += h[p][q] * f;
+                    }
+                }
+            }
+        }
+    }
+}
+
 impl Term for Hinge {
     fn name(&self) -> &'static str {
         "hinge"
@@ -160,41 +221,33 @@ impl Term for Hinge {
     }
 
     fn hessian(&self, e: usize, at: &Configuration<'_>, kind: HessianKind, out: &mut [Mat3]) {
-        let (fan, vertices) = (&self.group.fans[e], self.vertices(e));
-        let arity = self.group.arity;
-        let weights = &fan.measure.weights;
-        // rows: components of r
-        let mut b = [Mat3::zeros(); MAX_ARITY];
-        for k in 0..fan.hinge_count() {
-            let (local, x) = gather(fan, k, vertices, at.x);
-            for (i, g) in local.into_iter().zip(dihedral_gradient(&x, fan.floor)) {
-                b[i] += weights[k] * g.transpose();
+        let moment = if kind.exactness() > 0.0 {
+            self.moment(e, at)
+        } else {
+            Vec3::zeros()
+        };
+        self.curvature(e, at, kind, &self.angle_gradients(e, at), &moment, out);
+    }
+
+    fn derivatives(
+        &self,
+        e: usize,
+        at: &Configuration<'_>,
+        kind: HessianKind,
+        gradient: &mut [Vec3],
+        hessian: &mut [Mat3],
+    ) {
+        let moment = self.moment(e, at);
+        let angles = self.angle_gradients(e, at);
+        let fan = &self.group.fans[e];
+        gradient.fill(Vec3::zeros());
+        for (k, angle) in angles.iter().enumerate().take(fan.hinge_count()) {
+            let f = fan.measure.weights[k].dot(&moment);
+            for (i, g) in fan.local_hinge(k).into_iter().zip(angle) {
+                gradient[i] += g * f;
             }
         }
-        let d = fan.stiffness * (1.0 + fan.damping * at.inv_dt);
-        for i in 0..arity {
-            let left = b[i].transpose() * d;
-            for j in 0..=i {
-                out[i * (i + 1) / 2 + j] = left * b[j];
-            }
-        }
-        let exactness = kind.exactness();
-        if exactness == 0.0 {
-            return;
-        }
-        let moment = self.moment(e, at) * exactness;
-        for k in 0..fan.hinge_count() {
-            let (local, x) = gather(fan, k, vertices, at.x);
-            let f = weights[k].dot(&moment);
-            let h = dihedral_hessian(&x, fan.floor);
-            for (p, &i) in local.iter().enumerate() {
-                for (q, &j) in local.iter().enumerate() {
-                    if j <= i {
-                        out[i * (i + 1) / 2 + j] += h[p][q] * f;
-                    }
-                }
-            }
-        }
+        self.curvature(e, at, kind, &angles, &moment, hessian);
     }
 
     fn rest_gradient(

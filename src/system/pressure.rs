@@ -39,8 +39,8 @@ impl Term for Pressure {
         at.world.pressure == 0.0
     }
 
-    fn is_linear(&self) -> bool {
-        true
+    fn has_hessian(&self, _: HessianKind) -> bool {
+        false
     }
 
     fn stencils(&self) -> Stencils<'_> {

@@ -1,25 +1,100 @@
-//! Snapshots: the State as bytes, with magic, version, the garment's fingerprint and a checksum.
+//! Snapshots: the State as bytes, with what it belongs to, magic, version and a checksum.
 //!
 //! ```text
-//! "TOILESNP" | version u32 | fingerprint u64 | length u64 | payload | checksum u64   (little endian)
+//! "TOILESNP" | version u32 | length u64 | origin, state | checksum u64   (little endian)
 //! ```
 
 use super::state::State;
+use super::term::ContactSettings;
 use crate::cloth::Cloth;
 use crate::error::{Error, Result};
 use crate::math::Vec3;
 use crate::math::hash::Hash;
+use serde::{Deserialize, Serialize};
 
 const MAGIC: &[u8; 8] = b"TOILESNP";
-const VERSION: u32 = 1;
-const HEADER: usize = 8 + 4 + 8 + 8;
+const VERSION: u32 = 2;
+const HEADER: usize = 8 + 4 + 8;
+
+/// What a state belongs to: everything else that the next bits depend on. A state means the same in
+/// two simulations only if it is the same.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Origin {
+    /// Of mesh and fabrics, see [`fingerprint`].
+    pub garment: u64,
+    /// Of each body.
+    pub bodies: Vec<BodyOrigin>,
+    /// Tunables by name.
+    pub numbers: Vec<(String, f64)>,
+}
+
+/// A body as it came into the world.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BodyOrigin {
+    /// Fingerprint of its shape.
+    pub shape: u64,
+    /// How it meets the cloth.
+    pub contact: ContactSettings,
+}
+
+impl Origin {
+    /// What is not as in `own`, the origin of the simulation that restores.
+    fn difference(&self, own: &Self) -> Option<String> {
+        if self.garment != own.garment {
+            return Some("it was taken of another garment, resolution or fabric".into());
+        }
+        if self.bodies.len() != own.bodies.len() {
+            return Some(format!(
+                "it was taken with {} bodies, here are {}",
+                self.bodies.len(),
+                own.bodies.len()
+            ));
+        }
+        for (b, (theirs, ours)) in self.bodies.iter().zip(&own.bodies).enumerate() {
+            if theirs.shape != ours.shape {
+                return Some(format!("it was taken with another shape of body {b}"));
+            }
+            let numbers = |c: &ContactSettings| {
+                [
+                    ("friction", c.friction),
+                    ("thickness", c.thickness),
+                    ("stiffness", c.stiffness),
+                ]
+            };
+            let pairs = numbers(&theirs.contact)
+                .into_iter()
+                .zip(numbers(&ours.contact));
+            for ((name, there), (_, here)) in pairs {
+                if there.to_bits() != here.to_bits() {
+                    return Some(format!(
+                        "it was taken with {name} {there} of body {b}, here it is {here}"
+                    ));
+                }
+            }
+        }
+        let same =
+            |a: &(String, f64), b: &(String, f64)| a.0 == b.0 && a.1.to_bits() == b.1.to_bits();
+        let missing = own
+            .numbers
+            .iter()
+            .find(|n| !self.numbers.iter().any(|m| same(m, n)));
+        missing.map(|(name, here)| {
+            let there = self.numbers.iter().find(|n| n.0 == *name);
+            match there {
+                Some((_, there)) => {
+                    format!("it was taken with {name} = {there}, here it is {here}")
+                }
+                None => format!("it knows no {name}, here it is {here}"),
+            }
+        })
+    }
+}
 
 /// A number that two systems share only if their meshes and fabrics are the same.
 pub fn fingerprint(cloth: &Cloth) -> u64 {
     let mut hash = Hash::default();
     for p in &cloth.mesh.uv {
-        hash.add(&p.x.to_bits().to_le_bytes());
-        hash.add(&p.y.to_bits().to_le_bytes());
+        hash.numbers([p.x, p.y]);
     }
     for v in cloth.mesh.triangles.iter().flatten() {
         hash.add(&v.to_le_bytes());
@@ -27,7 +102,7 @@ pub fn fingerprint(cloth: &Cloth) -> u64 {
     for link in cloth.mesh.seams.iter().flat_map(|s| &s.links) {
         hash.add(&link.vertex.to_le_bytes());
         hash.add(&link.edge[0].to_le_bytes());
-        hash.add(&link.t.to_bits().to_le_bytes());
+        hash.numbers([link.t]);
     }
     for f in &cloth.fabrics {
         hash.add(format!("{f:?}").as_bytes());
@@ -36,12 +111,12 @@ pub fn fingerprint(cloth: &Cloth) -> u64 {
 }
 
 /// Bytes of a state.
-pub fn write(state: &State, fingerprint: u64) -> Result<Vec<u8>> {
-    let payload = postcard::to_stdvec(state).map_err(|e| Error::state(format!("snapshot: {e}")))?;
+pub fn write(state: &State, origin: &Origin) -> Result<Vec<u8>> {
+    let payload = postcard::to_stdvec(&(origin, state))
+        .map_err(|e| Error::state(format!("snapshot: {e}")))?;
     let mut bytes = Vec::with_capacity(HEADER + payload.len() + 8);
     bytes.extend_from_slice(MAGIC);
     bytes.extend_from_slice(&VERSION.to_le_bytes());
-    bytes.extend_from_slice(&fingerprint.to_le_bytes());
     bytes.extend_from_slice(&(payload.len() as u64).to_le_bytes());
     bytes.extend_from_slice(&payload);
     let mut hash = Hash::default();
@@ -50,8 +125,9 @@ pub fn write(state: &State, fingerprint: u64) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// The state in `bytes`; it must fit `like`, a state of the simulation that restores it.
-pub fn read(bytes: &[u8], fingerprint: u64, like: &State) -> Result<State> {
+/// The state in `bytes`; it must belong to `own`, and fit `like`, a state of the simulation that
+/// restores it.
+pub fn read(bytes: &[u8], own: &Origin, like: &State) -> Result<State> {
     let bad = |what: String| Error::parse(format!("snapshot: {what}"));
     if bytes.len() < HEADER + 8 || &bytes[..8] != MAGIC {
         return Err(bad(format!(
@@ -70,7 +146,7 @@ pub fn read(bytes: &[u8], fingerprint: u64, like: &State) -> Result<State> {
             "version {version}, this library reads {VERSION}"
         )));
     }
-    let length = number(20);
+    let length = number(12);
     if length != (bytes.len() - HEADER - 8) as u64 {
         return Err(bad(format!(
             "{length} bytes announced, {} there",
@@ -83,12 +159,13 @@ pub fn read(bytes: &[u8], fingerprint: u64, like: &State) -> Result<State> {
     if hash.value() != number(end) {
         return Err(bad("the checksum does not agree".into()));
     }
-    if number(12) != fingerprint {
-        return Err(bad(
-            "it was taken of another garment, resolution or fabric".into()
-        ));
+    // the origin first: of another one the rest may not even be a state
+    let (origin, rest): (Origin, _) =
+        postcard::take_from_bytes(&bytes[HEADER..end]).map_err(|e| bad(e.to_string()))?;
+    if let Some(difference) = origin.difference(own) {
+        return Err(bad(difference));
     }
-    let state: State = postcard::from_bytes(&bytes[HEADER..end]).map_err(|e| bad(e.to_string()))?;
+    let state: State = postcard::from_bytes(rest).map_err(|e| bad(e.to_string()))?;
     check(&state, like).map_err(bad)?;
     Ok(state)
 }
@@ -108,7 +185,29 @@ fn check(state: &State, like: &State) -> std::result::Result<(), String> {
             like.bodies.len()
         ));
     }
+    if state.u.len() != like.u.len()
+        || state.u_rates.len() != like.u.len()
+        || state.sliding.len() != like.u.len()
+        || state.strands.len() != like.strands.len()
+        || state.yarn_normals.len() != like.yarn_normals.len()
+    {
+        return Err(format!(
+            "{} passages of yarns in {} strands, {} in {} are expected",
+            state.u.len(),
+            state.strands.len(),
+            like.u.len(),
+            like.strands.len()
+        ));
+    }
     let fine = |v: &Vec3| v.iter().all(|c| c.is_finite());
+    let yarns_fine = state.u.iter().chain(&state.u_rates).all(|u| u.is_finite())
+        && state.yarn_normals.iter().all(fine)
+        && state.strands.iter().all(|s| {
+            s.anchor.is_finite()
+                && s.beside.is_finite()
+                && s.contact.is_finite()
+                && s.contact >= 0.0
+        });
     let bodies_fine = state.bodies.iter().all(|b| {
         fine(&b.pose.position)
             && fine(&b.target.position)
@@ -124,7 +223,11 @@ fn check(state: &State, like: &State) -> std::result::Result<(), String> {
             && a.normal_force.is_finite()
     }) && state.body_anchors.is_sorted_by_key(|a| (a.vertex, a.body))
         && state.pair_anchors.iter().all(|a| {
-            a.a < a.b && (a.b as usize) < n && fine(&a.offset) && a.normal_force.is_finite()
+            a.a < a.b
+                && (a.b as usize) < n
+                && fine(&a.offset)
+                && a.normal_force.is_finite()
+                && a.rest.is_finite()
         })
         && state.pair_anchors.is_sorted_by_key(|a| (a.a, a.b));
     let pins_fine = state
@@ -138,6 +241,7 @@ fn check(state: &State, like: &State) -> std::result::Result<(), String> {
         && fine(&state.wind)
         && state.pressure.is_finite();
     if !(bodies_fine
+        && yarns_fine
         && anchors_fine
         && pins_fine
         && numbers_fine

@@ -13,14 +13,17 @@ pub struct State {
     pub positions: Vec<Vec3>,
     /// Their velocities [m/s].
     pub velocities: Vec<Vec3>,
-    /// Material coordinate of every incidence of a yarn [m].
+    /// Material coordinate of each passage of a yarn through a node [m]; empty without yarns.
     pub u: Vec<f64>,
-    /// Its rate [m/s].
+    /// Their rates [m/s].
     pub u_rates: Vec<f64>,
     /// Whether the yarn slides there now, so that the coordinate is an unknown.
     pub sliding: Vec<bool>,
-    /// One for each strand of the yarns' stacks.
+    /// What each strand of the stacks has of friction.
     pub strands: Vec<StrandState>,
+    /// Normal of each node with several yarns, from the back to the front; zero elsewhere and before
+    /// it is known.
+    pub yarn_normals: Vec<Vec3>,
     /// Pinned vertices, sorted by vertex.
     pub pins: Vec<Pin>,
     /// One for each body of the world.
@@ -39,14 +42,15 @@ pub struct State {
     pub pressure: f64,
 }
 
-/// Friction of one strand in the stack of a node.
+/// Friction of a strand at a node, carried from step to step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StrandState {
-    /// Anchor of its sliding [m].
+    /// Anchor of its material coordinate [m].
     pub anchor: f64,
-    /// Anchor of its sliding past the next strand, if that lies beside it [m].
+    /// Anchor of its material coordinate less that of the next strand in the stack, where the two
+    /// lie beside each other [m].
     pub beside: f64,
-    /// Force between it and the next strand in the last accepted step [N].
+    /// Normal force with the next strand in the stack in the last accepted step [N].
     pub contact: f64,
 }
 
@@ -99,4 +103,6 @@ pub struct PairAnchor {
     pub offset: Vec3,
     /// Normal force of the last accepted step [N].
     pub normal_force: f64,
+    /// Distance that the pair pressed from in that step [m].
+    pub rest: f64,
 }

@@ -42,6 +42,9 @@ pub struct Configuration<'a> {
     pub x: &'a [Vec3],
     /// Positions at the start of the step [m].
     pub x0: &'a [Vec3],
+    /// Material coordinate of every passage of a yarn at the start of the step [m]: the value of
+    /// those that do not slide now. Empty without yarns.
+    pub u: &'a [f64],
     /// One over the step size [1/s]; 0 in statics, where rate terms vanish.
     pub inv_dt: f64,
     /// The world at the end of the step.
@@ -141,6 +144,18 @@ pub trait Term: Send + Sync {
     fn gradient(&self, e: usize, at: &Configuration<'_>, out: &mut [Vec3]);
     /// Its second derivative [N/m].
     fn hessian(&self, e: usize, at: &Configuration<'_>, kind: HessianKind, out: &mut [Mat3]);
+    /// Gradient and Hessian together, for terms that save by it.
+    fn derivatives(
+        &self,
+        e: usize,
+        at: &Configuration<'_>,
+        kind: HessianKind,
+        gradient: &mut [Vec3],
+        hessian: &mut [Mat3],
+    ) {
+        self.gradient(e, at, gradient);
+        self.hessian(e, at, kind, hessian);
+    }
     /// Directional derivative of `gradient` by rest shape and parameters.
     fn rest_gradient(
         &self,
@@ -157,9 +172,10 @@ pub trait Term: Send + Sync {
         let _ = at;
         false
     }
-    /// Whether the energy is linear, so that there is no Hessian.
-    fn is_linear(&self) -> bool {
-        false
+    /// Whether there is a Hessian of this kind; a linear energy has none.
+    fn has_hessian(&self, kind: HessianKind) -> bool {
+        let _ = kind;
+        true
     }
     /// Whether the energy is internal: no net force, invariant under rotation and translation.
     fn is_internal(&self) -> bool {

@@ -62,13 +62,7 @@ pub fn triangulate(
     garment.check_geometry()?;
     // u32 indices, and room for a margin above the estimate
     let max_vertices = max_vertices.min(u32::MAX as usize / 2);
-    let estimate = garment.estimated_vertices(edge_length_scale)?;
-    if !(estimate <= max_vertices as f64) {
-        return Err(Error::limit(format!(
-            "garment '{}': about {estimate:.3e} vertices, limit {max_vertices}",
-            garment.name
-        )));
-    }
+    garment.check_vertices(edge_length_scale, max_vertices)?;
     let segments: Vec<Vec<Segment>> = garment
         .panels
         .iter()

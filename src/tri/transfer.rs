@@ -70,6 +70,28 @@ impl Transfer {
         Ok(Self { triangle, weights })
     }
 
+    /// Locates points of panels, by panel and flat coordinates [m], in a mesh.
+    pub fn of_points(mesh: &GarmentMesh, panels: &[u32], uv: &[Vec2]) -> Result<Self> {
+        let count = mesh.panel_starts.len().saturating_sub(1);
+        let mut of_panel: Vec<Vec<u32>> = vec![Vec::new(); count];
+        for (k, panel) in mesh.triangle_panel.iter().enumerate() {
+            of_panel[*panel as usize].push(k as u32);
+        }
+        let mut buckets: Vec<Option<Buckets>> = (0..count).map(|_| None).collect();
+        let mut out = Self::default();
+        for (panel, p) in panels.iter().zip(uv) {
+            let list = of_panel.get(*panel as usize).filter(|l| !l.is_empty());
+            let Some(list) = list else {
+                return Err(Error::argument(format!("panel {panel} has no triangles")));
+            };
+            let grid = buckets[*panel as usize].get_or_insert_with(|| Buckets::new(mesh, list));
+            let t = grid.locate(mesh, list, *p);
+            out.triangle.push(t);
+            out.weights.push(barycentric(corners(mesh, t), *p));
+        }
+        Ok(out)
+    }
+
     /// Values at the fine vertices from values at the coarse vertices.
     pub fn apply(&self, coarse_triangles: &[[u32; 3]], coarse_values: &[Vec3]) -> Vec<Vec3> {
         self.triangle

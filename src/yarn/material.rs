@@ -7,8 +7,11 @@
 //! with Young's modulus `Y`, bending modulus `B`, shear modulus of the contacts `S` and radius `R`
 //! (Cirio et al. 2017, section 4; the woven shear as in Cirio et al. 2014).
 
+use crate::pattern::YarnFabric;
+use std::f64::consts::PI;
+
 /// One yarn as its energies see it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct YarnMaterial {
     /// Radius `R` [m].
     pub radius: f64,
@@ -36,4 +39,25 @@ pub struct YarnMaterial {
     pub damping_mass: f64,
     /// Stiffness-proportional damping [s].
     pub damping_stiffness: f64,
+}
+
+impl From<&YarnFabric> for YarnMaterial {
+    fn from(fabric: &YarnFabric) -> Self {
+        let square = fabric.radius * fabric.radius;
+        Self {
+            radius: fabric.radius,
+            density: fabric.density,
+            stretch: fabric.young * PI * square,
+            bending: fabric.bending * PI * square,
+            wrapping: fabric.wrapping,
+            stitch: fabric.stitch,
+            shear: fabric.shear * square,
+            spacing: fabric.spacing,
+            friction: fabric.friction,
+            anchor: fabric.anchor,
+            sliding_damping: fabric.sliding_damping,
+            damping_mass: fabric.damping_mass,
+            damping_stiffness: fabric.damping_stiffness,
+        }
+    }
 }

@@ -5,8 +5,19 @@
 //! through it, the yarn's material coordinate `u` there, its arc length at rest. A yarn is the
 //! ordered list of its incidences. Everything here is rest data; what moves is in the State.
 
+mod builder;
+mod check;
+mod cut;
+mod knit;
+pub mod layout;
 pub mod material;
+mod piece;
+mod region;
+mod rods;
+mod stitch;
+mod weave;
 
+pub use layout::{Cell, Layout, lay};
 pub use material::YarnMaterial;
 
 use crate::math::Vec2;
@@ -16,8 +27,8 @@ use crate::math::Vec2;
 pub struct YarnMesh {
     /// Flat coordinates of each node in its panel [m].
     pub uv: Vec<Vec2>,
-    /// Height of each node over its panel [m]: the small disturbance that lets a flat fabric leave
-    /// its plane.
+    /// Height of each node over its panel, along +z of the panel's plane [m]: the small disturbance
+    /// that lets a flat knit leave its plane. Weaves have none.
     pub lift: Vec<f64>,
     /// Panel of each node.
     pub node_panel: Vec<u32>,
@@ -31,7 +42,7 @@ pub struct YarnMesh {
     pub yarn_family: Vec<Family>,
     /// Stack of node `i`: `stack_starts[i]..stack_starts[i + 1]`; length `node_count + 1`.
     pub stack_starts: Vec<u32>,
-    /// Strands at each node from the back to the front of the cloth.
+    /// Strands at each node from the back to the front of the cloth, which is its outside.
     pub stacks: Vec<Strand>,
     /// Angles of stitches that unwrap (knits).
     pub wraps: Vec<Wrap>,

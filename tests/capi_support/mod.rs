@@ -42,7 +42,7 @@ pub fn has(program: &str) -> bool {
 }
 
 /// Source files of the C interface in the order of the header.
-pub const SOURCES: [&str; 9] = [
+pub const SOURCES: [&str; 10] = [
     "status.rs",
     "log.rs",
     "types.rs",
@@ -52,6 +52,7 @@ pub const SOURCES: [&str; 9] = [
     "sim.rs",
     "motion.rs",
     "readout.rs",
+    "array.rs",
 ];
 
 /// The header as cbindgen makes it from the sources.

@@ -203,7 +203,8 @@ class Instance:
         worst = OK
         for name, value in values.items():
             v = self.fmu.variables[name]
-            worst = max(worst, self.set_raw(v.kind, [v.reference], [value]))
+            values = np.ravel(value).tolist()
+            worst = max(worst, self.set_raw(v.kind, [v.reference], values))
         return worst
 
     def snapshot(self):

@@ -100,12 +100,14 @@ def test_drape_coefficient_rises_with_bending_stiffness(tmp_path):
     example = Path(__file__).parents[2] / "python" / "examples" / "sweep_drape.py"
     out = tmp_path / "drape"
     done = subprocess.run(
-        [sys.executable, str(example), "--runs", "4", "--workers", "2", "--scheduler", "processes",
+        [sys.executable, str(example), "--runs", "4", "--starts", "1", "--workers", "2", "--scheduler", "processes",
          "--program", os.environ["TOILE_PROGRAM"], "--out", str(out)],
         capture_output=True, text=True, timeout=300,
     )
     assert done.returncode == 0, done.stderr
     rows = [line.split(",") for line in out.with_suffix(".csv").read_text().splitlines()[1:]]
-    coefficients = [float(r[1]) for r in rows]
+    coefficients = [float(r[2]) for r in rows]
     assert coefficients == sorted(coefficients) and len(rows) == 4
     assert coefficients[0] < 0.5 and 0.95 < coefficients[-1] <= 1.01
+    folds = [int(r[3]) for r in rows]
+    assert folds[0] > 2 and folds[-1] == 0 and out.with_suffix(".png").stat().st_size > 5000

@@ -59,9 +59,9 @@ assert settled(before) == before, threads()
 
 @pytest.mark.parametrize("version", [2, 3])
 def test_library_unloads_again_and_again(archives, tmp_path, version):
-    """No thread is left when the library is let go, and it works when it is loaded once more. (Linear
-    algebra keeps a buffer for each of the master's threads, and the C library keeps what owns such a
-    buffer in memory until that thread ends: the library may stay mapped, which is safe.)"""
+    """No thread is left when the library is let go, and it works when it is loaded once more. (Matrix
+    products keep a buffer for each of the master's threads, and the C library keeps what owns such a
+    buffer in memory until that thread ends: the library stays mapped, which is safe.)"""
     run(
         START + """
 fmu = Fmu(archive, folder)
@@ -79,6 +79,36 @@ for i in range(30):
 assert len(out) == 1
 """,
         archives["hung", version], tmp_path,
+    )
+
+
+def test_library_leaves_memory_with_the_thread_that_used_it(archives, tmp_path):
+    """What the C library waits for is the end of that thread: after it, nothing stays mapped."""
+    run(
+        START + """
+import threading
+fmu = Fmu(archive, folder)
+def mapped():
+    return [line for line in open("/proc/self/maps") if str(fmu.binary) in line]
+def work():
+    cloth = fmu.instance()
+    assert cloth.put({"solver.threads": 2.0}) == OK
+    assert cloth.initialize() == OK
+    cloth.run(2)
+    cloth.outputs()
+    cloth.free()
+before = threads()
+for i in range(3):
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    # Python's join returns before the system's thread has ended
+    assert settled(before) == before and mapped()
+    _ctypes.dlclose(fmu.library._handle)
+    assert not mapped(), mapped()
+    fmu.library = ctypes.CDLL(str(fmu.binary))
+""",
+        archives["hung", 3], tmp_path,
     )
 
 

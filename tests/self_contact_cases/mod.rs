@@ -41,6 +41,7 @@ pub(crate) fn at<'a>(x: &'a [Vec3], x0: &'a [Vec3], dt: f64) -> Configuration<'a
     Configuration {
         x,
         x0,
+        u: &[],
         inv_dt: 1.0 / dt,
         world: &WORLD,
     }
@@ -122,6 +123,7 @@ pub(crate) fn state(positions: Vec<Vec3>) -> State {
         u_rates: Vec::new(),
         sliding: Vec::new(),
         strands: Vec::new(),
+        yarn_normals: Vec::new(),
         pins: Vec::new(),
         bodies: Vec::new(),
         body_anchors: Vec::new(),

@@ -17,6 +17,7 @@ pub fn energy(terms: &[Box<dyn Term>], x: &[Vec3], world: &World<'_>) -> f64 {
     let at = Configuration {
         x,
         x0: x,
+        u: &[],
         inv_dt: 0.0,
         world,
     };
@@ -34,6 +35,7 @@ pub fn gradient(terms: &[Box<dyn Term>], x: &[Vec3], world: &World<'_>) -> Vec<V
     let at = Configuration {
         x,
         x0: x,
+        u: &[],
         inv_dt: 0.0,
         world,
     };
@@ -62,6 +64,7 @@ fn assemble(
     let at = Configuration {
         x,
         x0: x,
+        u: &[],
         inv_dt: 0.0,
         world,
     };

@@ -216,6 +216,16 @@ pub fn gradient(term: &dyn Term, e: usize, at: &Configuration<'_>) -> Vec<Vec3> 
     g
 }
 
+/// Adds the gradient of all stencils of a term to that of the unknowns.
+pub fn add(term: &dyn Term, at: &Configuration<'_>, out: &mut [Vec3]) {
+    for e in 0..term.stencils().count() {
+        let g = gradient(term, e, at);
+        for (g, &v) in g.iter().zip(term.stencils().get(e)) {
+            out[v as usize] += g;
+        }
+    }
+}
+
 pub fn hessian(
     term: &dyn Term,
     e: usize,

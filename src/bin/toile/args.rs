@@ -39,6 +39,14 @@ pub(crate) enum Command {
         #[arg(long, default_value_t = 0.0)]
         cell: f64,
     },
+    /// Lays the yarns of a scene's fabrics on the flat panels, draws them and prints what there is.
+    Yarns {
+        #[command(flatten)]
+        scene: SceneArgs,
+        /// SVG file to write.
+        #[arg(long, value_name = "SVG")]
+        out: PathBuf,
+    },
     /// Draws model files: front, side and back beside each other, y up.
     Picture {
         /// Garment (OBJ, metres); each connected piece gets its own colour.

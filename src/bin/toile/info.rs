@@ -104,10 +104,12 @@ pub(crate) fn info(args: &SceneArgs) -> Done {
     }
     row("linear solver", info.backend.clone());
     row("mesh, terms, matrix", format!("{:.2} MiB", mib(info.bytes)));
-    row(
-        "factor, work arrays",
-        format!("{:.2} MiB", mib(info.factor_bytes)),
-    );
+    let factor = match info.factor_bytes {
+        // its size depends on the solver, which is chosen by the matrix
+        0 => "made by the first solve".into(),
+        bytes => format!("{:.2} MiB", mib(bytes)),
+    };
+    row("factor, work arrays", factor);
     row(
         "run",
         format!(

@@ -11,6 +11,7 @@ mod output;
 mod picture;
 mod run;
 mod summary;
+mod yarns;
 
 use args::{Cli, Command};
 use clap::Parser;
@@ -39,6 +40,7 @@ fn main() -> ExitCode {
             }
         }
         Command::Mannequin { out, cell } => info::mannequin(out, *cell),
+        Command::Yarns { scene, out } => yarns::yarns(scene, out),
         Command::Picture {
             garment,
             body,

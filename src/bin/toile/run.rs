@@ -12,10 +12,11 @@ use toile::error::Error;
 use toile::math::{Vec3, topology};
 use toile::readout::export::{gltf, obj, pc2};
 use toile::readout::picture::{PictureOptions, render};
-use toile::readout::{Part, crossings};
+use toile::readout::{Part, crossings, yarns};
 use toile::scene::Scene;
 use toile::sim::{DrapeOptions, Outcome, Progress, Sim, StepReport};
 use toile::sim_scene::{Driver, build};
+use toile::system::contact::crossing::SewnSurface;
 
 /// Time of `--verify` [s] and its step [s].
 const VERIFY: (u32, f64) = (60, 1.0 / 60.0);
@@ -78,9 +79,10 @@ pub(crate) fn run(args: &RunArgs) -> Done {
     let mut last = None;
     if scene.run.drape {
         last = Some(drape(&mut sim, &bar)?);
-        summary.outcome = last.as_ref().map(|r| r.outcome);
     }
-    summary.add(last.as_ref());
+    if let Some(report) = &last {
+        summary.take(report);
+    }
     let mut frames = Frames::new(&scene);
     let steps = scene.run.steps();
     let every = u64::from(scene.run.frame_every);
@@ -94,8 +96,7 @@ pub(crate) fn run(args: &RunArgs) -> Done {
         let report = sim
             .step(scene.run.dt)
             .map_err(|e| e.at(format!("step {step} of {steps}")))?;
-        summary.worst(report.outcome);
-        summary.add(Some(&report));
+        summary.take(&report);
         summary.steps += 1;
         last = Some(report);
         if every > 0 && step % every == 0 {
@@ -190,7 +191,29 @@ fn write(
         summary.body_crossings += crossings::crossing_edges(x, &edges, &positions, &faces).len();
         parts.push(Part::body(&body.name, positions, faces));
     }
-    let glb = gltf::to_glb(&parts, &frames.motions())?;
+    let sewn = SewnSurface::new(sim.mesh(), x).crossings(usize::MAX)?;
+    summary.self_crossings = sewn.len();
+    let mut motions = frames.motions();
+    if let Some(mesh) = sim.yarns() {
+        let (samples, sides) = yarns::detail(mesh);
+        let curves = sim.yarn_curves(samples);
+        file(
+            &dir.join("yarns.obj"),
+            obj::curves_to_obj(&curves).as_bytes(),
+        )?;
+        let tubes = yarns::tubes("yarns", &curves, sides);
+        let active = sim.active_vertices();
+        let seen = |v: &u32| active[*v as usize];
+        parts[0].triangles.retain(|t| t.iter().all(seen));
+        parts[0].lines.retain(|l| l.iter().all(seen));
+        if parts[0].triangles.is_empty() {
+            parts[0] = tubes;
+            motions.retain(|m| m.part != 0);
+        } else {
+            parts.push(tubes);
+        }
+    }
+    let glb = gltf::to_glb(&parts, &motions)?;
     file(&dir.join("scene.glb"), &glb)?;
     if !frames.times.is_empty() {
         file(&dir.join("garment.pc2"), &pc2::to_pc2(&frames.garment)?)?;
@@ -218,16 +241,21 @@ fn write(
 }
 
 impl Summary {
-    /// Keeps the outcome that matters most: a limit that was hit outweighs substeps.
-    fn worst(&mut self, outcome: Outcome) {
+    /// Adds the counts of a drape or a step and keeps the outcome that matters most: a limit that was
+    /// hit outweighs substeps.
+    fn take(&mut self, report: &StepReport) {
+        self.add(report);
         let rank = |o: Outcome| match o {
             Outcome::Converged => 0,
             Outcome::Substepped => 1,
             Outcome::IterationLimit => 2,
-            Outcome::Cancelled => 3,
+            Outcome::Stalled => 3,
+            Outcome::Falling => 4,
+            Outcome::Cancelled => 5,
         };
-        if self.outcome.is_none_or(|o| rank(o) < rank(outcome)) {
-            self.outcome = Some(outcome);
+        if self.outcome.is_none_or(|o| rank(o) < rank(report.outcome)) {
+            self.outcome = Some(report.outcome);
+            self.reason.clone_from(&report.reason);
         }
     }
 }

@@ -13,12 +13,14 @@ pub(crate) struct Summary {
     threads: f64,
     pub(crate) steps: u64,
     pub(crate) outcome: Option<Outcome>,
+    pub(crate) reason: String,
     newton_iterations: u64,
     linear_iterations: u64,
     substeps: u64,
     pub(crate) wall_seconds: f64,
     pub(crate) simulated_seconds: f64,
     pub(crate) body_crossings: usize,
+    pub(crate) self_crossings: usize,
     pub(crate) further_second_motion: Option<f64>,
     peak_memory: Option<u64>,
 }
@@ -33,12 +35,10 @@ impl Summary {
     }
 
     /// Adds the counts of a drape or a step.
-    pub(crate) fn add(&mut self, report: Option<&StepReport>) {
-        if let Some(r) = report {
-            self.newton_iterations += r.newton_iterations;
-            self.linear_iterations += r.linear_iterations;
-            self.substeps += r.substeps;
-        }
+    pub(crate) fn add(&mut self, report: &StepReport) {
+        self.newton_iterations += report.newton_iterations;
+        self.linear_iterations += report.linear_iterations;
+        self.substeps += report.substeps;
     }
 
     /// Takes the largest memory so far, before results are written.
@@ -56,9 +56,13 @@ impl Summary {
             "outcome",
             json!(self.outcome.unwrap_or(last.outcome).name()),
         );
+        if !self.reason.is_empty() {
+            put("reason", json!(self.reason));
+        }
         put("vertices", json!(info.vertices));
         put("triangles", json!(info.triangles));
-        put("yarn_nodes", json!(0));
+        put("yarn_nodes", json!(info.yarn_nodes));
+        put("yarns", json!(info.yarns));
         put("hybrid_nodes", json!(0));
         put("unknowns", json!(info.unknowns));
         put("min_angle_degrees", json!(info.min_angle.to_degrees()));
@@ -71,6 +75,7 @@ impl Summary {
         put("min_gap", json!(last.min_gap));
         put("max_seam_gap", json!(last.max_seam_gap));
         put("body_crossings", json!(self.body_crossings));
+        put("self_crossings", json!(self.self_crossings));
         put("kinetic_energy", json!(last.kinetic_energy));
         put("potential_energy", json!(last.potential_energy));
         if let Some(motion) = self.further_second_motion {
@@ -108,14 +113,18 @@ pub(crate) fn table(scene: &Scene, json: &Value, dir: &Path) -> String {
     let plain = |key: &str| json.get(key).map(|v| v.to_string().replace('"', ""));
     for (name, key) in [
         ("outcome", "outcome"),
+        ("reason", "reason"),
         ("vertices", "vertices"),
         ("triangles", "triangles"),
         ("steps", "steps"),
         ("Newton iterations", "newton_iterations"),
         ("edges through a body", "body_crossings"),
+        ("edges through cloth", "self_crossings"),
         ("threads", "threads"),
     ] {
-        row(name, plain(key).unwrap_or_default());
+        if let Some(value) = plain(key) {
+            row(name, value);
+        }
     }
     for (name, key, factor, unit) in [
         ("largest edge strain", "max_edge_strain", 100.0, "%"),

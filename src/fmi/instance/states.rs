@@ -6,6 +6,7 @@ use crate::fmi::drive;
 use crate::fmi::log::Status;
 use crate::fmi::results::Results;
 use crate::fmi::saved::Saved;
+use crate::fmi::variables::Values;
 
 impl Instance {
     /// Everything that the next answers depend on.
@@ -23,7 +24,7 @@ impl Instance {
             stop: self.stop,
             time: self.time,
             stale: self.stale,
-            report: self.results.report,
+            report: self.results.report.clone(),
             snapshot: if self.stale {
                 Vec::new()
             } else {
@@ -40,18 +41,13 @@ impl Instance {
 
     fn read_saved(&self, bytes: &[u8]) -> Result<Saved> {
         let saved = Saved::from_bytes(bytes, &self.token)?;
-        for values in [&saved.values, &saved.applied] {
-            if values.len() != self.values.len() {
-                return Err(Error::parse(format!(
-                    "FMU state: {} values, {} are expected",
-                    values.len(),
-                    self.values.len()
-                )));
-            }
-            let settable = self.model.variables.iter().zip(values);
-            for (variable, &value) in settable.filter(|(v, _)| v.is_settable()) {
-                variable.check(value).map_err(|e| e.at("FMU state"))?;
-            }
+        let applied = Values {
+            scalars: saved.applied.clone(),
+            arrays: saved.values.arrays.clone(),
+        };
+        for values in [&saved.values, &applied] {
+            let checked = values.check(&self.model.variables);
+            checked.map_err(|e| e.at("FMU state"))?;
         }
         Ok(saved)
     }
@@ -59,21 +55,23 @@ impl Instance {
     /// Goes to a saved state; on error the simulation is as it was.
     pub fn load(&mut self, bytes: &[u8]) -> Answer {
         let saved = self.read_saved(bytes)?;
-        let differs = !saved.stale && self.model.differ(&saved.values, &self.compiled);
+        let differs = !saved.stale && self.model.differ(&saved.values.scalars, &self.compiled);
         if self.broken || differs {
-            let mut sim = self.model.compile(&saved.values)?;
+            let mut sim = self.model.compile(&saved.values.scalars)?;
             let origin = sim.checkpoint();
             if !saved.stale {
+                drive::settings(&self.model, &saved.applied, &mut sim)?;
                 sim.restore(&saved.snapshot)?;
             }
             (self.sim, self.origin) = (sim, origin);
-            self.compiled.clone_from(&saved.values);
+            self.compiled.clone_from(&saved.values.scalars);
             self.broken = false;
         } else if !saved.stale {
-            self.sim.restore(&saved.snapshot)?;
-        }
-        if !saved.stale {
             drive::settings(&self.model, &saved.applied, &mut self.sim)?;
+            if let Err(error) = self.sim.restore(&saved.snapshot) {
+                drive::settings(&self.model, &self.applied, &mut self.sim)?;
+                return Err(error.into());
+            }
         }
         self.mode = saved.mode;
         self.values = saved.values;

@@ -37,7 +37,7 @@ impl Instance {
         for &reference in references {
             let variable = self.typed(kind, reference, fmi2)?;
             size = size.saturating_add(variable.size());
-            computed |= !variable.is_settable() && variable.quantity != Quantity::Time;
+            computed |= variable.is_computed();
         }
         if size != count {
             return Err(Error::argument(format!(
@@ -52,7 +52,7 @@ impl Instance {
         for &reference in references {
             let variable = &self.model.variables[reference as usize];
             if variable.is_settable() {
-                out.push(self.values[reference as usize]);
+                out.extend_from_slice(self.values.of(reference));
             } else if variable.quantity == Quantity::Time {
                 out.push(self.time);
             } else {
@@ -65,16 +65,22 @@ impl Instance {
 
     /// Sets variables, all of them or, on an error, none.
     pub fn write(&mut self, kind: Kind, references: &[u32], values: &[f64], fmi2: bool) -> Answer {
-        if references.len() != values.len() {
+        let mut size = 0_usize;
+        for &reference in references {
+            size = size.saturating_add(self.typed(kind, reference, fmi2)?.size());
+        }
+        if size != values.len() {
             return Err(Error::argument(format!(
-                "{} values for {} variables, which are scalars",
-                values.len(),
-                references.len()
+                "{} values were given, the variables have {size}",
+                values.len()
             ))
             .into());
         }
-        for (&reference, &value) in references.iter().zip(values) {
+        let mut rest = values;
+        for &reference in references {
             let variable = self.typed(kind, reference, fmi2)?;
+            let own;
+            (own, rest) = rest.split_at(variable.size());
             if !variable.is_settable() {
                 return Err(Error::argument(format!(
                     "{} is {} and cannot be set",
@@ -85,12 +91,16 @@ impl Instance {
             }
             self.expect(settable_in(variable))
                 .map_err(|e| e.at(format!("setting {}", variable.name)))?;
-            variable.check(value)?;
+            own.iter().try_for_each(|&value| variable.check(value))?;
         }
-        for (&reference, &value) in references.iter().zip(values) {
-            let slot = &mut self.values[reference as usize];
-            let changed = slot.to_bits() != value.to_bits();
-            *slot = value;
+        let mut rest = values;
+        for &reference in references {
+            let slot = self.values.of_mut(reference);
+            let own;
+            (own, rest) = rest.split_at(slot.len());
+            let bits = own.iter().map(|v| v.to_bits());
+            let changed = !slot.iter().map(|v| v.to_bits()).eq(bits);
+            slot.copy_from_slice(own);
             self.stale |= changed && self.mode != Mode::Step;
         }
         Ok(Status::Ok)

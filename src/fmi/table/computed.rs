@@ -1,6 +1,6 @@
 //! What the simulation answers: energies, extremes, counts, probes, arrays.
 
-use super::{AXES, Sizes, Table, probe_names};
+use super::{AXES, Sizes, Table, body_names, probe_names};
 use crate::fmi::variables::{Causality, Dimension, EnergyPart, Kind, Quantity, Variability};
 use crate::scene::{PinPlace, Scene};
 
@@ -68,7 +68,7 @@ impl Table {
             (
                 "step.outcome",
                 Quantity::Outcome,
-                "how the last step or drape ended: 0 converged, 1 in substeps, 2 iteration limit",
+                "how the last step or drape ended: 0 converged, 1 in substeps, 2 iteration limit, 4 stalled, 5 falling",
             ),
             (
                 "step.newton_iterations",
@@ -159,6 +159,33 @@ impl Table {
         Dimension::Count(reference, size)
     }
 
+    /// Vertices of a deforming mesh, as an array to be set.
+    fn mesh(&mut self, body: usize, name: &str, first: &[[f64; 3]], moves: bool) {
+        let name = format!("body.{name}.vertex");
+        let count = self.count(
+            format!("{name}.count"),
+            first.len(),
+            "number of vertices of the body's mesh",
+        );
+        self.parameter(
+            format!("{name}.driven"),
+            Quantity::MeshDriven(body),
+            "",
+            f64::from(u8::from(!moves)),
+            "true: the mesh follows vertex.position; false: the scene's frames",
+        )
+        .kind = Kind::Boolean;
+        let v = self.input(
+            format!("{name}.position"),
+            Quantity::MeshVertices(body),
+            "m",
+            0.0,
+            "vertices of the mesh in the body's frame where they are when a step ends, shape [count, 3]",
+        );
+        v.dimensions = vec![count, Dimension::Size(3)];
+        v.starts = first.as_flattened().to_vec();
+    }
+
     pub(super) fn arrays(&mut self, scene: &Scene, sizes: &Sizes) {
         let vertices = self.count("vertex.count".into(), sizes.vertices, "number of vertices");
         let triangles = self.count(
@@ -189,6 +216,11 @@ impl Table {
         ];
         for (name, quantity, unit, doc) in arrays {
             self.push(name, quantity, unit, doc).dimensions = vec![vertices, three];
+        }
+        for (b, (body, name)) in scene.bodies.iter().zip(body_names(scene)).enumerate() {
+            if let Some(first) = body.motion.frames.first() {
+                self.mesh(b, &name, first, body.motion.frames.len() > 1);
+            }
         }
         for (i, (probe, name)) in scene.probes.iter().zip(probe_names(scene)).enumerate() {
             if matches!(probe.place, PinPlace::Edge(_)) {

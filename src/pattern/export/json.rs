@@ -5,9 +5,11 @@
 
 use crate::error::{Error, Result};
 use crate::math::Vec2;
+use crate::pattern::chart::Notation;
 use crate::pattern::curve::Curve;
 use crate::pattern::import::json::VERSION;
-use crate::pattern::{BendingModel, Edge, Fabric, Garment, Panel, Placement};
+use crate::pattern::yarn_fabric::Structure;
+use crate::pattern::{BendingModel, Edge, Fabric, Garment, Panel, Placement, YarnFabric};
 use serde_json::{Map, Value, json};
 use std::fmt::Write as _;
 
@@ -97,7 +99,7 @@ fn angle(object: &mut Map<String, Value>, radians: f64, key: &str) -> Result<()>
 }
 
 fn fabric_value(fabric: &Fabric) -> Result<Value> {
-    Ok(json!({
+    let mut value = json!({
         "name": fabric.name,
         "density": number(fabric.density)?,
         "membrane": {
@@ -120,7 +122,61 @@ fn fabric_value(fabric: &Fabric) -> Result<Value> {
         },
         "thickness": number(fabric.thickness)?,
         "friction": number(fabric.friction)?,
-    }))
+    });
+    if let Some(yarns) = &fabric.yarns {
+        value["yarns"] = yarns_value(yarns)?;
+    }
+    Ok(value)
+}
+
+fn yarns_value(yarns: &YarnFabric) -> Result<Value> {
+    let mut value = Map::new();
+    match &yarns.structure {
+        Structure::Woven(weave) => {
+            let mask = weave.mask.lines();
+            value.insert(
+                "weave".into(),
+                mask.map_or_else(|lines| json!(lines), |name| json!(name)),
+            );
+            value.insert("warp_pitch".into(), number(weave.warp_pitch)?);
+            value.insert("weft_pitch".into(), number(weave.weft_pitch)?);
+        }
+        Structure::Knitted(knit) => {
+            let key = match knit.chart.notation() {
+                Notation::Grid => "chart",
+                Notation::Worked => "instructions",
+            };
+            value.insert(key.into(), json!(knit.chart.source()));
+            if knit.once {
+                value.insert("once".into(), json!(true));
+            }
+            value.insert("loop_width".into(), number(knit.loop_width)?);
+            value.insert("loop_height".into(), number(knit.loop_height)?);
+        }
+    }
+    for (key, x) in [
+        ("radius", yarns.radius),
+        ("density", yarns.density),
+        ("young", yarns.young),
+        ("bending", yarns.bending),
+        ("shear", yarns.shear),
+        ("wrapping", yarns.wrapping),
+        ("stitch", yarns.stitch),
+        ("spacing", yarns.spacing),
+        ("friction", yarns.friction),
+        ("anchor", yarns.anchor),
+        ("sliding_damping", yarns.sliding_damping),
+    ] {
+        value.insert(key.into(), number(x)?);
+    }
+    value.insert(
+        "damping".into(),
+        json!({
+            "mass": number(yarns.damping_mass)?,
+            "stiffness": number(yarns.damping_stiffness)?,
+        }),
+    );
+    Ok(Value::Object(value))
 }
 
 fn panel_value(garment: &Garment, panel: &Panel) -> Result<Value> {

@@ -20,6 +20,7 @@
 
 use super::read::{Node, Object, parse};
 use super::schema;
+use super::yarns::read_yarns;
 use crate::error::{Error, Result};
 use crate::pattern::{BendingModel, Fabric};
 
@@ -93,6 +94,7 @@ fn read_own(object: &Object<'_>) -> Result<Fabric> {
         fabric.damping_mass = damping.number_or("mass", fabric.damping_mass)?;
         fabric.damping_stiffness = damping.number_or("stiffness", fabric.damping_stiffness)?;
     }
+    fabric.yarns = object.get("yarns").map(|n| read_yarns(&n)).transpose()?;
     Ok(fabric)
 }
 

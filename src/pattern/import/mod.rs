@@ -9,6 +9,7 @@ pub mod garmentcode;
 pub mod json;
 pub mod read;
 pub mod schema;
+pub mod yarns;
 
 pub use fabric::fabric_from_json;
 

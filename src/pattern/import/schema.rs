@@ -17,7 +17,7 @@ pub struct Key {
     pub doc: &'static str,
 }
 
-const fn key(
+pub(super) const fn key(
     name: &'static str,
     kind: &'static str,
     unit: &'static str,
@@ -304,6 +304,13 @@ pub const FABRIC: &[Key] = &[
         "0.3",
         "Coulomb friction of cloth on cloth",
     ),
+    key(
+        "yarns",
+        "object",
+        "",
+        "none",
+        "the yarns that it is made of, for panels whose every yarn is simulated",
+    ),
 ];
 
 /// Keys of a fabric's membrane.
@@ -377,4 +384,6 @@ pub const TABLES: &[(&str, &[Key])] = &[
     ("garment.fabrics[].membrane", MEMBRANE),
     ("garment.fabrics[].bending", BENDING),
     ("garment.fabrics[].damping", DAMPING),
+    ("garment.fabrics[].yarns", super::yarns::YARNS),
+    ("garment.fabrics[].yarns.damping", DAMPING),
 ];

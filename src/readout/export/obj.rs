@@ -89,6 +89,25 @@ pub fn read_positions(text: &str) -> crate::error::Result<Vec<[f64; 3]>> {
     Ok(out)
 }
 
+/// Centre lines as OBJ text, one polyline for each.
+pub fn curves_to_obj(curves: &[crate::readout::yarns::Curve]) -> String {
+    let mut out = String::from("# toile; metres\n");
+    let mut next = 1;
+    for (k, curve) in curves.iter().enumerate() {
+        let _ = writeln!(out, "o yarn_{k}");
+        for p in &curve.points {
+            let _ = writeln!(out, "v {:.17e} {:.17e} {:.17e}", p.x, p.y, p.z);
+        }
+        out.push('l');
+        for i in next..next + curve.points.len() {
+            let _ = write!(out, " {i}");
+        }
+        out.push('\n');
+        next += curve.points.len();
+    }
+    out
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

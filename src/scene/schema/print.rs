@@ -42,8 +42,9 @@ pub fn text() -> String {
         };
         let _ = writeln!(
             out,
-            "  {}\n      number{unit}, default: {}, from {} to {}\n      {}",
+            "  {}\n      {}{unit}, default: {}, from {} to {}\n      {}",
             k.name,
+            if k.whole { "whole number" } else { "number" },
             k.default,
             k.min,
             k.max,
@@ -62,6 +63,9 @@ fn json_type(kind: &str) -> Value {
         "text" => json!({"type": "string"}),
         "boolean" => json!({"type": "boolean"}),
         "object" => json!({"type": "object"}),
+        "text or array of text" => {
+            json!({"anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}]})
+        }
         "text or integer" => json!({"type": ["string", "integer"]}),
         "[u, v]" => vector(2, "number"),
         "[x, y, z]" => vector(3, "number"),
@@ -117,7 +121,7 @@ fn nested(path: &str, k: &Key) -> Value {
             .iter()
             .map(|k| {
                 let value = json!({
-                    "type": "number", "minimum": k.min, "maximum": k.max,
+                    "type": if k.whole { "integer" } else { "number" }, "minimum": k.min, "maximum": k.max,
                     "default": k.default,
                     "description": format!("{} [{}]", k.doc.trim(), k.unit),
                 });

@@ -12,6 +12,7 @@
 
 use super::super::state::{BodyAnchor, State};
 use super::super::term::{Configuration, ContactSettings, HessianKind, Stencils, Term};
+use super::clearance::Clearance;
 use super::friction::{Friction, kept};
 use crate::math::{Mat3, Vec3};
 use crate::system::points::Points;
@@ -36,9 +37,7 @@ pub struct BodyContact {
     vertices: Vec<u32>,
     areas: Vec<f64>,
     radii: Vec<f64>,
-    /// Per vertex and body: how far the vertex may move before it can touch.
-    clearance: Vec<f64>,
-    body_count: usize,
+    clearance: Clearance,
     /// CSR by vertex.
     rub_starts: Vec<u32>,
     rubs: Vec<Rub>,
@@ -52,8 +51,7 @@ impl BodyContact {
             vertices: (0..n as u32).collect(),
             areas: points.areas.clone(),
             radii: points.radii.clone(),
-            clearance: Vec::new(),
-            body_count: 0,
+            clearance: Clearance::default(),
             rub_starts: vec![0; n + 1],
             rubs: Vec::new(),
         }
@@ -64,8 +62,7 @@ impl BodyContact {
         e: usize,
         at: &'a Configuration<'_>,
     ) -> impl Iterator<Item = usize> + 'a {
-        let moved = (at.x[e] - at.x0[e]).norm();
-        (0..self.body_count).filter(move |b| moved >= self.clearance[e * self.body_count + b])
+        self.clearance.touching(e, (at.x[e] - at.x0[e]).norm())
     }
 
     /// Distance from a body below which the point presses on it [m].
@@ -154,17 +151,14 @@ impl Term for BodyContact {
 
     fn begin_step(&mut self, state: &State, at: &Configuration<'_>) -> bool {
         let bodies = at.world.bodies;
-        self.body_count = bodies.count();
-        self.clearance.clear();
-        for (e, x) in at.x0[..self.vertices.len()].iter().enumerate() {
-            for b in 0..self.body_count {
-                self.clearance.push(if self.areas[e] > 0.0 {
-                    bodies.value(b, x) - self.thickness(e, bodies.contact(b))
-                } else {
-                    f64::INFINITY
-                });
+        let points = at.x0[..self.vertices.len()].iter().copied();
+        self.clearance.update(bodies, points, |e, contact| {
+            if self.areas[e] > 0.0 {
+                contact.thickness.max(self.radii[e])
+            } else {
+                f64::NEG_INFINITY
             }
-        }
+        });
         self.rubs.clear();
         self.rub_starts.fill(0);
         for anchor in &state.body_anchors {

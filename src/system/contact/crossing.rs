@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 use crate::math::Vec3;
 use crate::math::boxtree::{Aabb, BoxTree};
 use crate::math::topology::edges;
-use crate::tri::GarmentMesh;
+use crate::tri::{GarmentMesh, SeamLink};
 
 /// An edge (smaller vertex first) and the triangle that it passes through.
 pub type Crossing = ([u32; 2], u32);
@@ -76,14 +76,74 @@ pub fn crossings_with(
 /// Part of an edge within which a seam's link ties vertex to vertex.
 const ONE_POINT: f64 = 1e-6;
 
-/// Pairs of vertices that the seams of a garment tie together: a vertex and the ends of the edge that
-/// it is sewn to, and all vertices that are sewn into one point, as where four panels meet.
-pub fn glued_pairs(mesh: &GarmentMesh) -> Vec<[u32; 2]> {
-    let links = || mesh.seams.iter().flat_map(|s| &s.links);
-    let mut pairs: Vec<[u32; 2]> = links()
-        .flat_map(|l| l.edge.map(|e| [l.vertex, e]))
-        .collect();
-    // the smallest vertex of each point stands for it
+/// A garment as one surface: all vertices that seams tie into one point are that point.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SewnSurface {
+    /// Positions; a sewn vertex has the mean of all that are sewn with it [m].
+    pub positions: Vec<Vec3>,
+    /// Triangles on the vertices that stand for their points.
+    pub triangles: Vec<[u32; 3]>,
+    /// Vertices that are sewn to points between vertices, with those.
+    pub glued: Vec<[u32; 2]>,
+    /// Largest distance of a vertex from the point that it is sewn into [m].
+    pub moved: f64,
+}
+
+impl SewnSurface {
+    /// The surface of a garment at some positions. A seam holds its two rims together only to its
+    /// gap, within which they overlap or gape: of the surface, not of the rims, it can be said whether
+    /// it passes through itself.
+    pub fn new(mesh: &GarmentMesh, positions: &[Vec3]) -> Self {
+        let point = sewn_points(mesh);
+        let mut sums = vec![(Vec3::zeros(), 0.0); positions.len()];
+        for (p, x) in point.iter().zip(positions) {
+            let sum = &mut sums[*p as usize];
+            *sum = (sum.0 + x, sum.1 + 1.0);
+        }
+        let middles = point
+            .iter()
+            .map(|&p| sums[p as usize].0 / sums[p as usize].1);
+        let sewn: Vec<Vec3> = middles.collect();
+        let moves = sewn.iter().zip(positions).map(|(a, b)| (a - b).norm());
+        let between = links(mesh).filter(|l| one_point(l).is_none());
+        Self {
+            triangles: mesh
+                .triangles
+                .iter()
+                .map(|t| t.map(|v| point[v as usize]))
+                .collect(),
+            glued: between
+                .flat_map(|l| {
+                    l.edge
+                        .map(|e| [point[l.vertex as usize], point[e as usize]])
+                })
+                .collect(),
+            moved: moves.fold(0.0, f64::max),
+            positions: sewn,
+        }
+    }
+
+    /// Its crossings with itself, see [`crossings`].
+    pub fn crossings(&self, max: usize) -> Result<Vec<Crossing>> {
+        crossings(&self.triangles, &self.positions, &self.glued, max)
+    }
+}
+
+fn links(mesh: &GarmentMesh) -> impl Iterator<Item = &SeamLink> {
+    mesh.seams.iter().flat_map(|s| &s.links)
+}
+
+/// The vertex that a link ties its vertex to, if it is one.
+fn one_point(link: &SeamLink) -> Option<u32> {
+    match link.t {
+        t if t <= ONE_POINT => Some(link.edge[0]),
+        t if t >= 1.0 - ONE_POINT => Some(link.edge[1]),
+        _ => None,
+    }
+}
+
+/// For each vertex the smallest one that is sewn into the same point.
+fn sewn_points(mesh: &GarmentMesh) -> Vec<u32> {
     let mut point: Vec<u32> = (0..mesh.uv.len() as u32).collect();
     let find = |point: &[u32], mut v: u32| {
         while point[v as usize] != v {
@@ -91,20 +151,22 @@ pub fn glued_pairs(mesh: &GarmentMesh) -> Vec<[u32; 2]> {
         }
         v
     };
-    let mut members = Vec::new();
-    for link in links() {
-        let other = match link.t {
-            t if t <= ONE_POINT => link.edge[0],
-            t if t >= 1.0 - ONE_POINT => link.edge[1],
-            _ => continue,
-        };
-        let (a, b) = (find(&point, link.vertex), find(&point, other));
-        point[a.max(b) as usize] = a.min(b);
-        members.extend([link.vertex, other]);
+    for link in links(mesh) {
+        if let Some(other) = one_point(link) {
+            let (a, b) = (find(&point, link.vertex), find(&point, other));
+            point[a.max(b) as usize] = a.min(b);
+        }
     }
-    members.sort_unstable();
-    members.dedup();
-    let mut groups: Vec<(u32, u32)> = members.iter().map(|&v| (find(&point, v), v)).collect();
+    (0..point.len() as u32).map(|v| find(&point, v)).collect()
+}
+
+/// Pairs of vertices that the seams of a garment tie together: a vertex and the ends of the edge that
+/// it is sewn to, and all vertices that are sewn into one point, as where four panels meet.
+pub fn glued_pairs(mesh: &GarmentMesh) -> Vec<[u32; 2]> {
+    let mut pairs: Vec<[u32; 2]> = links(mesh)
+        .flat_map(|l| l.edge.map(|e| [l.vertex, e]))
+        .collect();
+    let mut groups: Vec<(u32, u32)> = sewn_points(mesh).into_iter().zip(0..).collect();
     groups.sort_unstable();
     for group in groups.chunk_by(|a, b| a.0 == b.0) {
         for (i, (_, a)) in group.iter().enumerate() {
@@ -195,7 +257,7 @@ fn side(a: &Vec3, b: &Vec3, c: &Vec3, d: &Vec3) -> f64 {
 mod tests {
     use super::*;
     use crate::math::Vec2;
-    use crate::tri::{SeamLink, SeamMesh};
+    use crate::tri::SeamMesh;
 
     #[test]
     fn all_vertices_sewn_into_one_point_are_glued() {
@@ -237,5 +299,51 @@ mod tests {
         for (a, b) in [(8, 0), (8, 4), (0, 8), (0, 7)] {
             assert!(!has(a, b), "{a} and {b}");
         }
+    }
+
+    #[test]
+    fn rims_that_overlap_within_a_seam_are_no_crossing_of_the_sewn_surface() {
+        // two triangles, sewn along an edge; the second one's rim reaches over the first one's
+        let x = [
+            Vec3::new(0.0, 0.0, 0.0),
+            Vec3::new(1.0, 0.0, 0.0),
+            Vec3::new(0.5, -1.0, 0.02),
+            Vec3::new(0.0, -0.01, 0.01),
+            Vec3::new(1.0, -0.01, -0.01),
+            Vec3::new(0.5, 1.0, 0.0),
+        ];
+        let link = |vertex, edge| SeamLink {
+            vertex,
+            edge,
+            t: 0.0,
+            length: 0.5,
+        };
+        let mesh = GarmentMesh {
+            uv: vec![Vec2::zeros(); 6],
+            triangles: vec![[0, 2, 1], [3, 4, 5]],
+            seams: vec![SeamMesh {
+                links: vec![link(0, [3, 4]), link(1, [4, 3])],
+                ..SeamMesh::default()
+            }],
+            ..GarmentMesh::default()
+        };
+        let rims = crossings(&mesh.triangles, &x, &[], 10).unwrap();
+        assert!(!rims.is_empty());
+        let sewn = SewnSurface::new(&mesh, &x);
+        assert!(sewn.crossings(10).unwrap().is_empty());
+        assert_eq!(sewn.triangles, [[0, 2, 1], [0, 1, 5]]);
+        assert!((sewn.moved - 0.5 * 2e-4_f64.sqrt()).abs() < 1e-12);
+        // a third one through both of them is
+        let mut through = mesh.clone();
+        through.triangles.push([6, 7, 8]);
+        through.uv = vec![Vec2::zeros(); 9];
+        let more = [(0.4, -1.0), (0.4, 1.0), (0.6, 1.0)].map(|(a, z)| Vec3::new(a, -0.2, z));
+        let x = [&x[..], &more].concat();
+        assert!(
+            !SewnSurface::new(&through, &x)
+                .crossings(10)
+                .unwrap()
+                .is_empty()
+        );
     }
 }

@@ -14,6 +14,7 @@
 
 use super::super::state::State;
 use super::super::term::{Configuration, HessianKind, Stencils, Term};
+use super::clearance::Clearance;
 use crate::cloth::Cloth;
 use crate::math::{Mat3, Vec3, topology};
 
@@ -22,9 +23,7 @@ use crate::math::{Mat3, Vec3, topology};
 pub struct EdgeContact {
     vertices: Vec<u32>,
     areas: Vec<f64>,
-    /// Per edge and body: how far the mid-point may move before it can touch.
-    clearance: Vec<f64>,
-    body_count: usize,
+    clearance: Clearance,
 }
 
 impl EdgeContact {
@@ -43,13 +42,12 @@ impl EdgeContact {
         Self {
             vertices: edges.into_flattened(),
             areas,
-            clearance: Vec::new(),
-            body_count: 0,
+            clearance: Clearance::default(),
         }
     }
 
     fn middle(&self, e: usize, x: &[Vec3]) -> Vec3 {
-        0.5 * (x[self.vertices[2 * e] as usize] + x[self.vertices[2 * e + 1] as usize])
+        middle(&self.vertices, e, x)
     }
 
     /// Bodies that the mid-point may touch.
@@ -60,7 +58,7 @@ impl EdgeContact {
         middle: &Vec3,
     ) -> impl Iterator<Item = usize> + 'a {
         let moved = (middle - self.middle(e, at.x0)).norm();
-        (0..self.body_count).filter(move |b| moved >= self.clearance[e * self.body_count + b])
+        self.clearance.touching(e, moved)
     }
 
     /// Stiffness and depth below half the thickness.
@@ -71,6 +69,10 @@ impl EdgeContact {
             0.5 * contact.thickness - distance,
         )
     }
+}
+
+fn middle(vertices: &[u32], e: usize, x: &[Vec3]) -> Vec3 {
+    0.5 * (x[vertices[2 * e] as usize] + x[vertices[2 * e + 1] as usize])
 }
 
 impl Term for EdgeContact {
@@ -128,16 +130,12 @@ impl Term for EdgeContact {
     }
 
     fn begin_step(&mut self, _: &State, at: &Configuration<'_>) -> bool {
-        self.body_count = at.world.bodies.count();
-        self.clearance.clear();
-        for e in 0..self.areas.len() {
-            let m = self.middle(e, at.x0);
-            for b in 0..self.body_count {
-                let thickness = at.world.bodies.contact(b).thickness;
-                self.clearance
-                    .push(at.world.bodies.value(b, &m) - 0.5 * thickness);
-            }
-        }
+        let vertices = &self.vertices;
+        let middles = (0..self.areas.len()).map(|e| middle(vertices, e, at.x0));
+        self.clearance
+            .update(at.world.bodies, middles, |_, contact| {
+                0.5 * contact.thickness
+            });
         false
     }
 

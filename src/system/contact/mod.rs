@@ -1,6 +1,7 @@
 //! Contact: cloth against bodies, cloth against itself, and the checks that nothing passed through.
 
 pub mod body;
+mod clearance;
 pub mod crossing;
 pub mod edge;
 mod friction;

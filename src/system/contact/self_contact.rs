@@ -11,6 +11,10 @@
 //!   step. A pair rubs from its second step on. The anchor does not turn with the cloth: a fold
 //!   turning as a whole feels friction up to the same bound.
 //!
+//! A pair that overlaps without having come there in steps (panels placed on one another) has no
+//! business with `d0` yet: in motion it presses from the distance that it is found at, and that
+//! distance grows to `d0` by `SEPARATION`. The whole of the energy at once would become speed.
+//!
 //! `c` is zero except for pairs that meet in a plane: coincident panels have no side to be pushed
 //! to. Then `c` points along the outside normal of the cloth at `a` (or against it, where `b` already
 //! is on that side), 0.02 `d0` long: enough for the forces to have a way out.
@@ -37,10 +41,13 @@ const FLAT: f64 = 0.02;
 /// Part of a radius that a vertex may move in a step beside what its velocity tells.
 const SLACK: f64 = 0.15;
 
+/// Speed at which pairs that began in each other are pushed apart [m/s].
+const SEPARATION: f64 = 0.1;
+
 /// One pair of spheres.
 #[derive(Clone, Copy, Debug)]
 struct Pair {
-    /// `d0` [m].
+    /// Distance that it presses from: `d0`, or less while it is separated [m].
     distance: f64,
     /// `k` [N/m].
     stiffness: f64,
@@ -189,7 +196,8 @@ impl SelfContact {
         found.sort_unstable();
     }
 
-    fn pair(&self, [a, b]: [u32; 2], x: &[Vec3], anchor: Option<&PairAnchor>) -> Pair {
+    /// A pair at the start of a step of `dt` [s], 0 in statics.
+    fn pair(&self, [a, b]: [u32; 2], x: &[Vec3], anchor: Option<&PairAnchor>, dt: f64) -> Pair {
         let distance = self.spheres.rest_distance(a, b);
         let w = x[b as usize] - x[a as usize];
         let outside = match self.normals[a as usize] {
@@ -205,8 +213,13 @@ impl SelfContact {
         };
         let stiffness = self.stiffness * 0.5 * (self.areas[a as usize] + self.areas[b as usize]);
         let normal = (w + bias).try_normalize(1e-300).unwrap_or(outside);
+        let from = anchor.map_or((w + bias).norm(), |p| p.rest);
         Pair {
-            distance,
+            distance: if dt > 0.0 {
+                distance.min(from + SEPARATION * dt)
+            } else {
+                distance
+            },
             stiffness,
             bias,
             normal,
@@ -301,7 +314,8 @@ impl Term for SelfContact {
         for &[a, b] in &found {
             while anchors.next_if(|p| (p.a, p.b) < (a, b)).is_some() {}
             let anchor = anchors.next_if(|p| (p.a, p.b) == (a, b));
-            self.pairs.push(self.pair([a, b], &state.positions, anchor));
+            self.pairs
+                .push(self.pair([a, b], &state.positions, anchor, dt));
         }
         self.found = found;
         changed
@@ -326,6 +340,7 @@ impl Term for SelfContact {
                 b: self.stencils[2 * e + 1],
                 offset,
                 normal_force,
+                rest: pair.distance,
             });
         }
     }

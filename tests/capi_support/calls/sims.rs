@@ -180,7 +180,7 @@ pub(super) fn read_sim(world: &World, choices: &mut Choices<'_>) -> toile_status
     let body = choices.index();
     let point = choices.numbers(3);
     let status = unsafe {
-        match choices.below(16) {
+        match choices.below(20) {
             0 => toile_sim_positions(sim, out, capacity, needed),
             1 => toile_sim_velocities(sim, out, capacity, needed),
             2 => toile_sim_normals(sim, out, capacity, needed),
@@ -194,6 +194,18 @@ pub(super) fn read_sim(world: &World, choices: &mut Choices<'_>) -> toile_status
                 let mut view = filled(toile_view_f64_init);
                 view.struct_size = size(choices, view.struct_size);
                 toile_sim_positions_view(sim, choices.maybe_mut(&mut view))
+            }
+            16 => toile_sim_yarn_nodes(sim, out, capacity, needed),
+            17 => toile_sim_yarn_tensions(sim, out, capacity, needed),
+            18 => toile_sim_yarn_slips(sim, out, capacity, needed),
+            15 => {
+                let mut array = ptr::null_mut();
+                let mut view = filled(toile_view_f64_init);
+                view.struct_size = size(choices, view.struct_size);
+                let made = toile_sim_velocities_array(sim, choices.maybe_mut(&mut array));
+                let seen = toile_array_view(array, choices.maybe_mut(&mut view));
+                toile_array_free(array);
+                if made == TOILE_OK { seen } else { made }
             }
             10 => {
                 let mut energies = filled(toile_energies_init);

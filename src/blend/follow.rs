@@ -1,0 +1,153 @@
+//! Vertices carried by the yarns around them.
+//!
+//! A vertex at `u_v` of the flat panel takes the value at `u_v` of the affine map that fits the nodes
+//! within a distance `r` best,
+//!
+//! ```text
+//! min over c, A of  sum_k w_k |x_k - c - A (u_k - u_v)|^2,   w_k = (1 - |u_k - u_v|^2 / r^2)^2
+//! ```
+//!
+//! (moving least squares; Lancaster and Salkauskas 1981), so `x_v = c` is a fixed combination of
+//! nodes that carries every affine motion exactly. `r` begins at the given reach and grows until at
+//! least eight nodes that do not lie on one line are in it.
+
+use crate::error::{Error, Result};
+use crate::math::{Mat3, Vec2, Vec3};
+use crate::tri::GarmentMesh;
+use crate::yarn::YarnMesh;
+
+/// Fewest nodes that carry a vertex.
+const FEWEST: usize = 8;
+/// Growth of the reach, and how often it may grow.
+const GROWTH: f64 = 1.5;
+const GROWTHS: usize = 24;
+/// Determinant of the moments over the product of their diagonal below which nodes are collinear.
+const FLAT: f64 = 1e-3;
+
+/// Weights of nodes for each vertex that is carried.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Follow {
+    /// The vertices.
+    pub vertices: Vec<u32>,
+    /// Nodes of vertex `k` of the list: `starts[k]..starts[k + 1]`.
+    starts: Vec<u32>,
+    nodes: Vec<u32>,
+    weights: Vec<f64>,
+}
+
+impl Follow {
+    /// Weights for the vertices of the panels in `panels`; `reach` is the length of an edge there [m].
+    pub fn new(
+        mesh: &GarmentMesh,
+        yarns: &YarnMesh,
+        panels: &[bool],
+        reach: impl Fn(u32) -> f64,
+    ) -> Result<Self> {
+        let mut out = Self {
+            starts: vec![0],
+            ..Self::default()
+        };
+        for (panel, _) in panels.iter().enumerate().filter(|(_, wanted)| **wanted) {
+            let reach = reach(panel as u32);
+            let buckets = Buckets::new(yarns, panel as u32, reach);
+            for vertex in mesh.panel_starts[panel]..mesh.panel_starts[panel + 1] {
+                let place = mesh.uv[vertex as usize];
+                if !out.carry(yarns, &buckets, &place, reach) {
+                    return Err(Error::geometry(format!(
+                        "panel {panel}: too few yarns near vertex {vertex} at ({:.4}, {:.4}) m",
+                        place.x, place.y
+                    )));
+                }
+                out.vertices.push(vertex);
+                out.starts.push(out.nodes.len() as u32);
+            }
+        }
+        Ok(out)
+    }
+
+    fn carry(&mut self, yarns: &YarnMesh, buckets: &Buckets, place: &Vec2, reach: f64) -> bool {
+        let mut r = reach;
+        for _ in 0..GROWTHS {
+            let near = buckets.within(yarns, place, r);
+            let weight = |d: f64| (1.0 - d / (r * r)).powi(2);
+            let moments: Mat3 = near
+                .iter()
+                .map(|(node, d)| {
+                    let p = basis(&(yarns.uv[*node as usize] - place), r);
+                    p * p.transpose() * weight(*d)
+                })
+                .sum();
+            let scale = moments[(0, 0)] * moments[(1, 1)] * moments[(2, 2)];
+            if near.len() >= FEWEST
+                && moments.determinant() > FLAT * scale
+                && let Some(inverse) = moments.try_inverse()
+            {
+                let row = inverse.column(0).into_owned();
+                for (node, d) in near {
+                    let p = basis(&(yarns.uv[node as usize] - place), r);
+                    self.nodes.push(node);
+                    self.weights.push(weight(d) * row.dot(&p));
+                }
+                return true;
+            }
+            r *= GROWTH;
+        }
+        false
+    }
+
+    /// Writes the values of the carried vertices from those of the nodes.
+    pub fn apply(&self, nodes: &[Vec3], vertices: &mut [Vec3]) {
+        for (k, vertex) in self.vertices.iter().enumerate() {
+            let range = self.starts[k] as usize..self.starts[k + 1] as usize;
+            vertices[*vertex as usize] = range
+                .map(|j| nodes[self.nodes[j] as usize] * self.weights[j])
+                .sum();
+        }
+    }
+}
+
+fn basis(offset: &Vec2, r: f64) -> Vec3 {
+    Vec3::new(1.0, offset.x / r, offset.y / r)
+}
+
+/// Nodes of one panel, sorted by the cells of a grid.
+struct Buckets {
+    cell: f64,
+    /// Cell and node, sorted.
+    entries: Vec<((i64, i64), u32)>,
+}
+
+impl Buckets {
+    fn new(yarns: &YarnMesh, panel: u32, cell: f64) -> Self {
+        let mut entries: Vec<_> = (0..yarns.uv.len())
+            .filter(|n| yarns.node_panel[*n] == panel)
+            .map(|n| (key(&yarns.uv[n], cell), n as u32))
+            .collect();
+        entries.sort_unstable();
+        Self { cell, entries }
+    }
+
+    /// Nodes nearer than `r`, with the squares of their distances.
+    fn within(&self, yarns: &YarnMesh, place: &Vec2, r: f64) -> Vec<(u32, f64)> {
+        let low = key(&(place - Vec2::repeat(r)), self.cell);
+        let high = key(&(place + Vec2::repeat(r)), self.cell);
+        let mut near = Vec::new();
+        for i in low.0..=high.0 {
+            let from = self.entries.partition_point(|e| e.0 < (i, low.1));
+            for (cell, node) in &self.entries[from..] {
+                if *cell > (i, high.1) {
+                    break;
+                }
+                let d = (yarns.uv[*node as usize] - place).norm_squared();
+                if d < r * r {
+                    near.push((*node, d));
+                }
+            }
+        }
+        near
+    }
+}
+
+fn key(p: &Vec2, cell: f64) -> (i64, i64) {
+    ((p.x / cell).floor() as i64, (p.y / cell).floor() as i64)
+}

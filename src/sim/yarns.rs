@@ -1,0 +1,273 @@
+//! Yarns of a simulation: where they are, what holds them, and the vertices that follow them.
+
+use super::{Sim, finite};
+use crate::blend::Follow;
+use crate::blend::embed::carried;
+use crate::blend::region::yarn_panels;
+use crate::cloth::Cloth;
+use crate::error::{Error, Result};
+use crate::math::Vec3;
+use crate::pattern::Garment;
+use crate::readout::yarns::{Curve, curves};
+use crate::solve::settings::Settings;
+use crate::system::state::State;
+use crate::system::yarn::friction::loose;
+use crate::tri::GarmentMesh;
+use crate::yarn::layout::Layout;
+use crate::yarn::{Incidence, YarnMaterial, YarnMesh, Yarns, lay};
+use std::sync::Arc;
+
+/// Yarns and the vertices that they carry.
+pub(super) struct YarnPart {
+    pub(super) yarns: Arc<Yarns>,
+    /// Panels that are simulated as yarns.
+    pub(super) panels: Vec<bool>,
+    follow: Follow,
+}
+
+impl YarnPart {
+    /// Lays the yarns of the panels that the garment's blend regions cover.
+    pub(super) fn new(
+        garment: &Garment,
+        mesh: &GarmentMesh,
+        settings: &Settings,
+    ) -> Result<Option<Self>> {
+        let panels = yarn_panels(garment)?;
+        let wanted: Vec<u32> = (0..)
+            .zip(&panels)
+            .filter(|(_, w)| **w)
+            .map(|p| p.0)
+            .collect();
+        if wanted.is_empty() {
+            return Ok(None);
+        }
+        let layout = Layout {
+            panels: Some(&wanted),
+            max_nodes: settings.max_yarn_nodes as usize,
+            ..Layout::default()
+        };
+        let laid = lay(garment, &layout)?;
+        let materials = garment
+            .fabrics
+            .iter()
+            .map(|f| f.yarns.as_ref().map(YarnMaterial::from).unwrap_or_default())
+            .collect();
+        let reach = |panel: u32| garment.panel_edge_length(&garment.panels[panel as usize]);
+        let follow = Follow::new(mesh, &laid, &panels, reach)?;
+        Ok(Some(Self {
+            yarns: Arc::new(Yarns {
+                mesh: laid,
+                materials,
+            }),
+            panels,
+            follow,
+        }))
+    }
+
+    /// The cloth without the triangles that the yarns stand for.
+    pub(super) fn rest_of(&self, garment: &Garment, mesh: &GarmentMesh) -> Result<Cloth> {
+        Cloth::new(garment, mesh.without_triangles_of(&self.panels))
+    }
+
+    /// Adds the nodes, where the panels are placed, to a state of the vertices.
+    pub(super) fn place(&self, garment: &Garment, state: &mut State) {
+        let mesh = &self.yarns.mesh;
+        for node in 0..mesh.uv.len() {
+            let placement = &garment.panels[mesh.node_panel[node] as usize].placement;
+            let (uv, lift) = (mesh.uv[node], mesh.lift[node]);
+            let local = Vec3::new(uv.x, uv.y, lift);
+            state
+                .positions
+                .push(placement.rotation * local + placement.translation);
+            state.velocities.push(Vec3::zeros());
+        }
+        state.u = mesh.incidences.iter().map(|i| i.u).collect();
+        state.u_rates = vec![0.0; mesh.incidences.len()];
+        state.sliding = vec![false; mesh.incidences.len()];
+        state.strands = loose(mesh, &state.u);
+        state.yarn_normals = vec![Vec3::zeros(); mesh.uv.len()];
+        self.carry(state);
+    }
+
+    /// Lets the vertices follow.
+    pub(super) fn carry(&self, state: &mut State) {
+        let first = state.positions.len() - self.yarns.mesh.uv.len();
+        for values in [&mut state.positions, &mut state.velocities] {
+            let (vertices, nodes) = values.split_at_mut(first);
+            self.follow.apply(nodes, vertices);
+        }
+    }
+
+    /// Puts the nodes where the vertices say.
+    pub(super) fn take(&self, mesh: &GarmentMesh, state: &mut State) -> Result<()> {
+        let first = mesh.uv.len();
+        for values in [&mut state.positions, &mut state.velocities] {
+            let nodes = carried(mesh, &values[..first], &self.yarns.mesh)?;
+            values.truncate(first);
+            values.extend(nodes);
+        }
+        Ok(())
+    }
+
+    /// Whether a vertex follows.
+    pub(super) fn follows(&self, vertex: u32) -> bool {
+        self.follow.vertices.binary_search(&vertex).is_ok()
+    }
+}
+
+impl Sim {
+    /// The yarns as laid, if there are any.
+    pub fn yarns(&self) -> Option<&YarnMesh> {
+        self.yarns.as_ref().map(|part| &part.yarns.mesh)
+    }
+
+    /// Positions of the yarns' nodes [m].
+    pub fn yarn_nodes(&self) -> &[Vec3] {
+        &self.state.positions[self.mesh.uv.len()..]
+    }
+
+    /// Material coordinate of every incidence [m].
+    pub fn yarn_coordinates(&self) -> &[f64] {
+        &self.state.u
+    }
+
+    /// Unit normal at each node from the back to the front of the cloth; that of the placed panel where
+    /// no step has told it yet, zero at nodes of one yarn.
+    pub fn yarn_normals(&self) -> Vec<Vec3> {
+        let Some(mesh) = self.yarns() else {
+            return Vec::new();
+        };
+        let panel = |n: usize| &self.garment.panels[mesh.node_panel[n] as usize];
+        (self.state.yarn_normals.iter().enumerate())
+            .map(|(n, known)| {
+                if mesh.stack(n).len() > 1 && *known == Vec3::zeros() {
+                    panel(n).placement.rotation * Vec3::z()
+                } else {
+                    *known
+                }
+            })
+            .collect()
+    }
+
+    /// Smooth centre lines of the yarns, `samples` pieces to a segment.
+    pub fn yarn_curves(&self, samples: usize) -> Vec<Curve> {
+        let Some(part) = &self.yarns else {
+            return Vec::new();
+        };
+        let radius = |y| part.yarns.material(y).radius;
+        let normals = self.yarn_normals();
+        curves(
+            &part.yarns.mesh,
+            self.yarn_nodes(),
+            &normals,
+            radius,
+            samples,
+        )
+    }
+
+    /// Tension between each incidence and the next of its yarn [N]; 0 at the last.
+    pub fn yarn_tensions(&self) -> Vec<f64> {
+        let Some(part) = &self.yarns else {
+            return Vec::new();
+        };
+        let (mesh, x) = (&part.yarns.mesh, self.yarn_nodes());
+        let mut out = vec![0.0; mesh.incidences.len()];
+        for y in 0..mesh.yarn_count() {
+            let stiffness = part.yarns.material(y).stretch;
+            for i in mesh.starts[y] as usize + 1..mesh.starts[y + 1] as usize {
+                let [a, b] = [i - 1, i].map(|i| x[mesh.incidences[i].node as usize]);
+                let du = self.state.u[i] - self.state.u[i - 1];
+                out[i - 1] = stiffness * ((b - a).norm() / du - 1.0);
+            }
+        }
+        out
+    }
+
+    /// Largest normal force between two yarns at each node in the last accepted step [N].
+    pub fn yarn_compressions(&self) -> Vec<f64> {
+        let Some(mesh) = self.yarns() else {
+            return Vec::new();
+        };
+        (0..mesh.uv.len())
+            .map(|n| {
+                let range = mesh.stack_starts[n] as usize..mesh.stack_starts[n + 1] as usize;
+                self.state.strands[range]
+                    .iter()
+                    .map(|s| s.contact)
+                    .fold(0.0, f64::max)
+            })
+            .collect()
+    }
+
+    /// How far each yarn has slid at its incidences since it was laid [m].
+    pub fn yarn_slips(&self) -> Vec<f64> {
+        let laid = self.yarns().map_or(&[][..], |mesh| &mesh.incidences);
+        let moved = |(u, laid): (&f64, &Incidence)| u - laid.u;
+        self.state.u.iter().zip(laid).map(moved).collect()
+    }
+
+    /// For each vertex whether it moves by itself; the others follow yarns.
+    pub fn active_vertices(&self) -> Vec<bool> {
+        let count = self.mesh.uv.len() as u32;
+        let follows = |v| self.yarns.as_ref().is_some_and(|part| part.follows(v));
+        (0..count).map(|v| !follows(v)).collect()
+    }
+
+    /// Holds nodes of yarns as [`Sim::pin`] holds vertices; yarns do not slide where they are held.
+    pub fn pin_yarn_nodes(&mut self, nodes: &[u32], targets: Option<&[[f64; 3]]>) -> Result<()> {
+        let first = self.first_node(nodes)?;
+        if let Some(targets) = targets {
+            if targets.len() != nodes.len() {
+                return Err(Error::argument(format!(
+                    "{} nodes but {} targets",
+                    nodes.len(),
+                    targets.len()
+                )));
+            }
+            for (n, t) in nodes.iter().zip(targets) {
+                finite(&format!("target of yarn node {n}"), t)?;
+            }
+        }
+        for (k, node) in nodes.iter().enumerate() {
+            self.hold(first + node, targets.map(|t| Vec3::from(t[k])));
+            if let Some(part) = &self.yarns {
+                for strand in part.yarns.mesh.stack(*node as usize) {
+                    self.state.sliding[strand.incidence as usize] = false;
+                    self.state.u_rates[strand.incidence as usize] = 0.0;
+                }
+            }
+        }
+        self.epoch += 1;
+        Ok(())
+    }
+
+    /// Lets nodes of yarns go; one that is not held is refused.
+    pub fn unpin_yarn_nodes(&mut self, nodes: &[u32]) -> Result<()> {
+        let first = self.first_node(nodes)?;
+        if let Some(n) = nodes.iter().find(|n| !self.is_pinned(first + **n)) {
+            return Err(Error::argument(format!("yarn node {n} is not pinned")));
+        }
+        let held: Vec<u32> = nodes.iter().map(|n| first + n).collect();
+        self.state.pins.retain(|p| !held.contains(&p.vertex));
+        self.epoch += 1;
+        Ok(())
+    }
+
+    /// Lets the vertices under yarns follow them.
+    pub(super) fn carry_vertices(&mut self) {
+        if let Some(part) = &self.yarns {
+            part.carry(&mut self.state);
+        }
+    }
+
+    /// Point number of node 0, all `nodes` being there.
+    fn first_node(&self, nodes: &[u32]) -> Result<u32> {
+        let count = self.yarn_nodes().len();
+        match nodes.iter().find(|&&n| n as usize >= count) {
+            Some(n) => Err(Error::argument(format!(
+                "yarn node {n} does not exist: the simulation has {count}"
+            ))),
+            None => Ok(self.mesh.uv.len() as u32),
+        }
+    }
+}

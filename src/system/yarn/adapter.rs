@@ -1,0 +1,272 @@
+//! Kernels as terms: gathers a stencil's scalars from blocks of unknowns or from constants, scatters
+//! derivatives to the blocks.
+//!
+//! A stencil's blocks are those of its nodes and then those of its sliding coordinates, each once; two
+//! coordinates may lie in one block. Stencils are grouped by their number of blocks, a term for
+//! each; a stencil of coordinates alone that do not slide has no unknowns and is left out, its
+//! energy a constant.
+
+use super::super::state::State;
+use super::super::term::{Configuration, HessianKind, Stencils, Term};
+use super::kernel::{Kernel, Local, MAX_POSITIONS, MAX_SLIDES};
+use super::unknowns::Unknowns;
+use crate::math::{Mat3, Vec3};
+
+/// Place of a scalar that is no unknown.
+const FROZEN: u8 = u8::MAX;
+
+/// A kernel and the scalars that it acts on.
+pub(super) struct Stencil<K> {
+    /// Its nodes; only the first `POSITIONS` count.
+    pub(super) nodes: [u32; MAX_POSITIONS],
+    /// Incidences of its material coordinates; only as many count as the kernel has.
+    pub(super) incidences: [u32; MAX_SLIDES],
+    /// Its energy.
+    pub(super) kernel: K,
+}
+
+struct Element<K, const N: usize> {
+    kernel: K,
+    incidences: [u32; MAX_SLIDES],
+    /// Three times the block plus the component of each scalar among the stencil's blocks.
+    place: [u8; N],
+}
+
+/// All stencils of one kernel with the same number of blocks.
+pub struct YarnTerm<K, const N: usize> {
+    arity: usize,
+    blocks: Vec<u32>,
+    elements: Vec<Element<K, N>>,
+}
+
+/// Terms of all stencils, one for each number of blocks that occurs.
+pub(super) fn terms<K: Kernel<N> + 'static, const N: usize>(
+    unknowns: &Unknowns,
+    stencils: impl IntoIterator<Item = Stencil<K>>,
+) -> Vec<Box<dyn Term>> {
+    let mut groups: Vec<YarnTerm<K, N>> = (0..=MAX_POSITIONS + MAX_SLIDES)
+        .map(|arity| YarnTerm {
+            arity,
+            blocks: Vec::new(),
+            elements: Vec::new(),
+        })
+        .collect();
+    for stencil in stencils {
+        let mut blocks = [0; MAX_POSITIONS + MAX_SLIDES];
+        let mut arity = 0;
+        let mut place = [FROZEN; N];
+        let mut local = |block: u32| {
+            let known = blocks[..arity].iter().position(|&b| b == block);
+            known.unwrap_or_else(|| {
+                blocks[arity] = block;
+                arity += 1;
+                arity - 1
+            }) as u8
+        };
+        for p in 0..K::POSITIONS {
+            let b = local(unknowns.node(stencil.nodes[p]));
+            for c in 0..3 {
+                place[3 * p + c] = 3 * b + c as u8;
+            }
+        }
+        for k in 3 * K::POSITIONS..N {
+            let incidence = stencil.incidences[k - 3 * K::POSITIONS];
+            if let Some((block, component)) = unknowns.slides[incidence as usize] {
+                place[k] = 3 * local(block) + component;
+            }
+        }
+        let group = &mut groups[arity];
+        group.blocks.extend_from_slice(&blocks[..arity]);
+        group.elements.push(Element {
+            kernel: stencil.kernel,
+            incidences: stencil.incidences,
+            place,
+        });
+    }
+    groups
+        .into_iter()
+        .skip(1)
+        .filter(|g| !g.elements.is_empty())
+        .map(|g| Box::new(g) as Box<dyn Term>)
+        .collect()
+}
+
+impl<K: Kernel<N>, const N: usize> YarnTerm<K, N> {
+    #[inline]
+    fn gather(&self, e: usize, from: &[Vec3], u: &[f64]) -> [f64; N] {
+        let element = &self.elements[e];
+        let blocks = &self.blocks[self.arity * e..][..self.arity];
+        let mut q = [0.0; N];
+        for p in 0..K::POSITIONS {
+            let x = &from[blocks[usize::from(element.place[3 * p] / 3)] as usize];
+            q[3 * p] = x.x;
+            q[3 * p + 1] = x.y;
+            q[3 * p + 2] = x.z;
+        }
+        for k in 3 * K::POSITIONS..N {
+            let place = element.place[k];
+            q[k] = if place == FROZEN {
+                u[element.incidences[k - 3 * K::POSITIONS] as usize]
+            } else {
+                from[blocks[usize::from(place / 3)] as usize][usize::from(place % 3)]
+            };
+        }
+        q
+    }
+
+    fn with<R>(
+        &self,
+        e: usize,
+        at: &Configuration<'_>,
+        f: impl FnOnce(&K, &Local<'_, N>) -> R,
+    ) -> R {
+        let (q, q0) = (self.gather(e, at.x, at.u), self.gather(e, at.x0, at.u));
+        let local = Local {
+            q: &q,
+            q0: &q0,
+            inv_dt: at.inv_dt,
+            gravity: at.world.gravity,
+        };
+        f(&self.elements[e].kernel, &local)
+    }
+}
+
+impl<K: Kernel<N>, const N: usize> Term for YarnTerm<K, N> {
+    fn name(&self) -> &'static str {
+        K::NAME
+    }
+
+    fn stencils(&self) -> Stencils<'_> {
+        Stencils {
+            arity: self.arity,
+            vertices: &self.blocks,
+        }
+    }
+
+    fn value(&self, e: usize, at: &Configuration<'_>) -> f64 {
+        self.with(e, at, |kernel, local| kernel.value(local))
+    }
+
+    fn gradient(&self, e: usize, at: &Configuration<'_>, out: &mut [Vec3]) {
+        let mut g = [0.0; N];
+        self.with(e, at, |kernel, local| kernel.gradient(local, &mut g));
+        out.fill(Vec3::zeros());
+        for (place, g) in self.elements[e].place.iter().zip(g) {
+            if *place != FROZEN {
+                out[usize::from(place / 3)][usize::from(place % 3)] += g;
+            }
+        }
+    }
+
+    fn hessian(&self, e: usize, at: &Configuration<'_>, kind: HessianKind, out: &mut [Mat3]) {
+        let mut h = [[0.0; N]; N];
+        self.with(e, at, |kernel, local| {
+            kernel.hessian(local, kind.exactness(), &mut h);
+        });
+        let place = &self.elements[e].place;
+        out.fill(Mat3::zeros());
+        for p in 0..K::POSITIONS {
+            for r in 0..=p {
+                let (i, j) = (usize::from(place[3 * p] / 3), usize::from(place[3 * r] / 3));
+                let mut m = Mat3::zeros();
+                for a in 0..3 {
+                    for b in 0..3 {
+                        m[(a, b)] = if p == r && b > a {
+                            h[3 * p + b][3 * p + a]
+                        } else {
+                            h[3 * p + a][3 * r + b]
+                        };
+                    }
+                }
+                let slot = &mut out[i.max(j) * (i.max(j) + 1) / 2 + i.min(j)];
+                if i > j || p == r {
+                    *slot += m;
+                } else if i < j {
+                    *slot += m.transpose();
+                } else {
+                    // a node that is in the stencil twice
+                    *slot += m + m.transpose();
+                }
+            }
+        }
+        for k in 3 * K::POSITIONS..N {
+            if place[k] == FROZEN {
+                continue;
+            }
+            let (i, a) = (usize::from(place[k] / 3), usize::from(place[k] % 3));
+            for l in 0..=k {
+                if place[l] == FROZEN {
+                    continue;
+                }
+                let (j, b) = (usize::from(place[l] / 3), usize::from(place[l] % 3));
+                let slot = &mut out[i.max(j) * (i.max(j) + 1) / 2 + i.min(j)];
+                if i >= j {
+                    slot[(a, b)] += h[k][l];
+                } else {
+                    slot[(b, a)] += h[k][l];
+                }
+                if i == j && a != b {
+                    slot[(b, a)] += h[k][l];
+                }
+            }
+        }
+    }
+
+    fn is_idle(&self, at: &Configuration<'_>) -> bool {
+        K::is_idle(at.inv_dt)
+    }
+
+    fn has_hessian(&self, kind: HessianKind) -> bool {
+        !(K::LINEAR && (self.arity == K::POSITIONS || kind.exactness() == 0.0))
+    }
+
+    fn is_internal(&self) -> bool {
+        K::INTERNAL
+    }
+
+    fn begin_step(&mut self, state: &State, at: &Configuration<'_>) -> bool {
+        if !K::LAGGED {
+            return false;
+        }
+        for e in 0..self.elements.len() {
+            let q0 = self.gather(e, at.x0, at.u);
+            let local = Local {
+                q: &q0,
+                q0: &q0,
+                inv_dt: at.inv_dt,
+                gravity: at.world.gravity,
+            };
+            let blocks = &self.blocks[self.arity * e..][..self.arity];
+            let element = &mut self.elements[e];
+            let mut rates = [0.0; N];
+            for k in 0..N {
+                let place = element.place[k];
+                if k < 3 * K::POSITIONS {
+                    let block = blocks[usize::from(place / 3)] as usize;
+                    rates[k] = state.velocities[block][usize::from(place % 3)];
+                } else if place != FROZEN {
+                    rates[k] = state.u_rates[element.incidences[k - 3 * K::POSITIONS] as usize];
+                }
+            }
+            element.kernel.begin(&local, &rates, state);
+        }
+        false
+    }
+
+    fn max_step(&self, at: &Configuration<'_>) -> f64 {
+        if !K::BOUNDS {
+            return 1.0;
+        }
+        (0..self.elements.len())
+            .map(|e| self.with(e, at, K::bound))
+            .fold(1.0, f64::min)
+    }
+
+    fn accept(&mut self, at: &Configuration<'_>, state: &mut State) {
+        if K::LAGGED {
+            for e in 0..self.elements.len() {
+                self.with(e, at, |kernel, local| kernel.accept(local, state));
+            }
+        }
+    }
+}

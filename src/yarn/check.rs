@@ -1,0 +1,272 @@
+//! Refuses yarn meshes that contradict themselves or their garment.
+
+use super::region::Region;
+use super::{Family, YarnMesh};
+use crate::error::{Error, Result};
+use crate::pattern::Garment;
+
+/// Relative difference of lengths that rounding explains.
+const ROUNDING: f64 = 1e-9;
+/// Nodes may lie this far outside [m]: polygons stand in for curves.
+const OUTSIDE: f64 = 1e-4;
+
+fn refuse<T>(text: impl Into<String>) -> Result<T> {
+    Err(Error::geometry(text.into()))
+}
+
+fn near(a: f64, b: f64) -> bool {
+    (a - b).abs() <= ROUNDING * a.abs().max(b.abs())
+}
+
+impl YarnMesh {
+    /// Checks every index, order and length: `u` grows along each yarn; every incidence stands in the
+    /// stack of its node and in no other; yarns are frozen at their ends and at nodes of one yarn; what
+    /// joins incidences joins neighbours of one yarn.
+    pub fn check(&self) -> Result<()> {
+        self.check_sizes()?;
+        self.check_yarns()?;
+        self.check_stacks()?;
+        self.check_contacts()?;
+        self.check_crossings()
+    }
+
+    /// [`YarnMesh::check`], and that nodes lie on the panels and yarns are of the garment's fabrics.
+    pub fn check_on(&self, garment: &Garment) -> Result<()> {
+        self.check()?;
+        let regions = garment
+            .panels
+            .iter()
+            .map(Region::new)
+            .collect::<Result<Vec<_>>>()?;
+        for (k, (uv, panel)) in self.uv.iter().zip(&self.node_panel).enumerate() {
+            let Some(region) = regions.get(*panel as usize) else {
+                return refuse(format!("node {k}: panel {panel} of {}", regions.len()));
+            };
+            let p = region.to_frame(*uv);
+            if !region.inside(p)
+                && region
+                    .nearest(p)
+                    .is_none_or(|(distance, _)| distance > OUTSIDE)
+            {
+                return refuse(format!(
+                    "node {k} at ({}, {}) m lies outside of panel '{}'",
+                    uv.x, uv.y, garment.panels[*panel as usize].name
+                ));
+            }
+        }
+        for (y, fabric) in self.yarn_fabric.iter().enumerate() {
+            let known = garment.fabrics.get(*fabric as usize);
+            if known.is_none_or(|f| f.yarns.is_none()) {
+                return refuse(format!("yarn {y}: fabric {fabric} has no yarns"));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_sizes(&self) -> Result<()> {
+        let (nodes, yarns) = (self.uv.len(), self.yarn_count());
+        for (name, has, wants) in [
+            ("lift", self.lift.len(), nodes),
+            ("node_panel", self.node_panel.len(), nodes),
+            ("stack_starts", self.stack_starts.len(), nodes + 1),
+            ("stacks", self.stacks.len(), self.incidences.len()),
+            ("starts", self.starts.len(), yarns + 1),
+            ("yarn_family", self.yarn_family.len(), yarns),
+        ] {
+            if has != wants {
+                return refuse(format!("{name} has {has} entries, must have {wants}"));
+            }
+        }
+        for (name, starts, total) in [
+            ("starts", &self.starts, self.incidences.len()),
+            ("stack_starts", &self.stack_starts, self.stacks.len()),
+        ] {
+            let grows = starts.windows(2).all(|w| w[0] <= w[1]);
+            if !grows || starts[0] != 0 || starts[starts.len() - 1] as usize != total {
+                return refuse(format!("{name} must grow from 0 to {total}"));
+            }
+        }
+        for (k, (uv, lift)) in self.uv.iter().zip(&self.lift).enumerate() {
+            if !(uv.x.is_finite() && uv.y.is_finite() && lift.is_finite()) {
+                return refuse(format!("node {k} at ({}, {}, {lift})", uv.x, uv.y));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_yarns(&self) -> Result<()> {
+        for y in 0..self.yarn_count() {
+            let yarn = self.yarn(y);
+            let [Some(first), Some(last)] = [yarn.first(), yarn.last()] else {
+                return refuse(format!("yarn {y} is empty"));
+            };
+            if yarn.len() < 2 || first.slides || last.slides {
+                return refuse(format!("yarn {y} must have two ends that do not slide"));
+            }
+            for (k, pair) in yarn.windows(2).enumerate() {
+                if !(pair[1].u > pair[0].u && pair[1].u.is_finite()) {
+                    return refuse(format!(
+                        "yarn {y}: u goes from {} to {} m after passage {k}",
+                        pair[0].u, pair[1].u
+                    ));
+                }
+            }
+            if let Some(bad) = yarn.iter().find(|i| i.node as usize >= self.uv.len()) {
+                return refuse(format!("yarn {y}: node {} of {}", bad.node, self.uv.len()));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_stacks(&self) -> Result<()> {
+        let mut seen = vec![false; self.incidences.len()];
+        for node in 0..self.uv.len() {
+            let stack = self.stack(node);
+            for strand in stack {
+                let Some(incidence) = self.incidences.get(strand.incidence as usize) else {
+                    return refuse(format!("node {node}: incidence {}", strand.incidence));
+                };
+                if incidence.node as usize != node || seen[strand.incidence as usize] {
+                    return refuse(format!(
+                        "incidence {} stands in the stack of node {node} and belongs to another, or twice",
+                        strand.incidence
+                    ));
+                }
+                seen[strand.incidence as usize] = true;
+                if stack.len() == 1 && incidence.slides {
+                    return refuse(format!("node {node}: its only yarn slides"));
+                }
+            }
+            // the crossing yarn lies before or behind all strands of the other group
+            let changes = stack
+                .windows(2)
+                .filter(|w| w[0].group != w[1].group)
+                .count();
+            if stack.is_empty() || changes > 1 || (stack.len() > 1 && changes == 0) {
+                return refuse(format!(
+                    "node {node}: {} strands in {} groups",
+                    stack.len(),
+                    changes + 1
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether the two incidences follow each other in one yarn.
+    fn neighbours(&self, a: u32, b: u32) -> bool {
+        let total = self.incidences.len() as u32;
+        if a >= total || b >= total || a.abs_diff(b) != 1 {
+            return false;
+        }
+        // no yarn begins at the later of the two
+        self.starts.binary_search(&a.max(b)).is_err()
+    }
+
+    fn check_contacts(&self) -> Result<()> {
+        let length =
+            |[a, b]: [u32; 2]| self.incidences[b as usize].u - self.incidences[a as usize].u;
+        for (k, spring) in self.stitch_springs.iter().enumerate() {
+            let [a, b] = spring.incidences;
+            if a >= b || !self.neighbours(a, b) || !near(length([a, b]), spring.length) {
+                return refuse(format!("stitch spring {k}: {spring:?}"));
+            }
+        }
+        for (k, spacing) in self.spacings.iter().enumerate() {
+            let [a, b] = spacing.incidences;
+            let good = a < b
+                && self.neighbours(a, b)
+                && near(length([a, b]), spacing.length)
+                && spacing.least > 0.0
+                && spacing.least < spacing.length;
+            if !good {
+                return refuse(format!("spacing {k}: {spacing:?}"));
+            }
+        }
+        for (k, wrap) in self.wraps.iter().enumerate() {
+            let [q0, q1] = wrap.axis;
+            // a wing's strand runs through both nodes of the axis and on to the wing
+            let strand = |wing: u32, near: u32, far: u32| {
+                [wing.checked_sub(1), wing.checked_add(1)]
+                    .into_iter()
+                    .flatten()
+                    .filter(|at| self.neighbours(*at, wing))
+                    .find(|at| {
+                        let beyond = if *at < wing {
+                            at.checked_sub(1)
+                        } else {
+                            at.checked_add(1)
+                        };
+                        let node = |k: u32| self.incidences[k as usize].node;
+                        node(*at) == near
+                            && beyond.is_some_and(|b| self.neighbours(b, *at) && node(b) == far)
+                    })
+            };
+            let (a, b) = (strand(wrap.wings[0], q0, q1), strand(wrap.wings[1], q1, q0));
+            let apart = match (a, b) {
+                (Some(a), Some(b)) => a != b && !self.neighbours(a, b),
+                _ => false,
+            };
+            if q0 == q1 || !apart || !(wrap.length > 0.0) || wrap.sign.abs() != 1.0 {
+                return refuse(format!("wrap {k}: {wrap:?}"));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_crossings(&self) -> Result<()> {
+        for (k, corner) in self.corners.iter().enumerate() {
+            let [q, a, b] = corner.nodes;
+            let beside = |q: u32, other: u32| {
+                (q as usize) < self.uv.len()
+                    && self.stack(q as usize).iter().any(|s| {
+                        let i = s.incidence;
+                        [i.checked_sub(1), i.checked_add(1)]
+                            .into_iter()
+                            .flatten()
+                            .any(|n| {
+                                self.neighbours(i, n) && self.incidences[n as usize].node == other
+                            })
+                    })
+            };
+            if a == b || !beside(q, a) || !beside(q, b) || !(corner.length > 0.0) {
+                return refuse(format!("corner {k}: {corner:?}"));
+            }
+        }
+        for (k, tie) in self.ties.iter().enumerate() {
+            let nodes = self.uv.len() as u32;
+            let [a, b] = tie.segment;
+            let good = tie.node < nodes
+                && b < nodes
+                && b == a + 1
+                && tie.node != a
+                && tie.node != b
+                && (0.0..=1.0).contains(&tie.t)
+                && tie.length >= 0.0;
+            if !good {
+                return refuse(format!("tie {k}: {tie:?}"));
+            }
+            let stack = [self.stack(a as usize), self.stack(b as usize)];
+            let rod = match (stack[0], stack[1]) {
+                ([p], [q]) => self
+                    .neighbours(p.incidence, q.incidence)
+                    .then_some(p.incidence),
+                _ => None,
+            };
+            let seam = rod.is_some_and(|i| {
+                let yarn = self.starts.partition_point(|s| *s <= i) - 1;
+                self.yarn_family[yarn] == Family::Seam
+            });
+            let frozen = self
+                .stack(tie.node as usize)
+                .iter()
+                .all(|s| !self.incidences[s.incidence as usize].slides);
+            if !seam || !frozen {
+                return refuse(format!(
+                    "tie {k}: {tie:?} must freeze its node at a seam's rod"
+                ));
+            }
+        }
+        Ok(())
+    }
+}

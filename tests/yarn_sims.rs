@@ -1,0 +1,236 @@
+//! Patches simulated as yarns alone: what fabrics are known to do, and what hosts rely on.
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may panic")]
+
+use toile::pattern::import::garment_from_json;
+use toile::sim::{DrapeOptions, Outcome, Settings, Sim, SimOptions};
+
+/// A rectangle of a fabric of yarns, every yarn simulated.
+fn patch(yarns: &str, width: f64, height: f64, region: &str) -> String {
+    format!(
+        r#"{{"toile_garment": 1, "name": "patch", "edge_length": {},
+            "panels": [{{"name": "p", "fabric": "y",
+                "vertices": [[0, 0], [{width}, 0], [{width}, {height}], [0, {height}]],
+                "edges": [[0, 1], [1, 2], [2, 3], [3, 0]]}}],
+            "fabrics": [{{"name": "y", "yarns": {yarns}}}],
+            "blend_regions": [{{"panel": "p", "polygon": {region}}}]}}"#,
+        0.2 * width.max(height)
+    )
+}
+
+const WHOLE: &str = "[[-1, -1], [1, -1], [1, 1], [-1, 1]]";
+
+fn sim(text: &str, gravity: f64, numbers: &[(&str, f64)]) -> Sim {
+    let garment = garment_from_json(text, None).expect("garment");
+    let mut settings = Settings::default();
+    for (name, value) in numbers {
+        settings.set(name, *value).expect("number");
+    }
+    let options = SimOptions {
+        gravity: Some([0.0, gravity, 0.0]),
+        settings,
+        ..SimOptions::default()
+    };
+    Sim::new(&garment, &options).expect("sim")
+}
+
+fn knit(structure: &str, loops: usize) -> String {
+    let w = 0.003;
+    let n = loops as f64;
+    // the finished size of so many wales and courses
+    let (width, height) = ((n + 0.4) * w, (n + 0.5) * 0.85 * w + 0.18 * w);
+    let yarns = format!(r#"{{"preset": "jersey", "knit": "{structure}"}}"#);
+    patch(&yarns, width, height, WHOLE)
+}
+
+/// Mean height over the middle of the patch of its `[left and right, bottom and top]` rims, towards
+/// the front, in loop widths.
+fn rims(sim: &Sim) -> [f64; 2] {
+    let mesh = sim.yarns().expect("yarns");
+    let high = mesh.uv.iter().fold(mesh.uv[0], |m, p| m.sup(p));
+    let mean = |wanted: &dyn Fn(f64, f64) -> bool| {
+        let list = mesh.uv.iter().zip(sim.yarn_nodes());
+        let kept: Vec<f64> = list
+            .filter(|(p, _)| wanted(p.x / high.x - 0.5, p.y / high.y - 0.5))
+            .map(|(_, x)| x.z / 0.003)
+            .collect();
+        kept.iter().sum::<f64>() / kept.len() as f64
+    };
+    let middle = mean(&|u, v| u.abs() < 0.15 && v.abs() < 0.15);
+    [
+        mean(&|u, v| u.abs() > 0.4 && v.abs() < 0.2) - middle,
+        mean(&|u, v| v.abs() > 0.4 && u.abs() < 0.2) - middle,
+    ]
+}
+
+fn relaxed(structure: &str) -> Sim {
+    let mut sim = sim(&knit(structure, 8), 0.0, &[]);
+    let options = DrapeOptions {
+        force_tolerance: 1e-5,
+        max_steps: 400,
+    };
+    let _ = sim.drape(&options, &mut |_| true).expect("drape");
+    sim
+}
+
+/// Knit loops carry their heads and feet to the back and their legs to the front when they relax: the
+/// top and bottom of jersey roll to the front, its sides to the back, and purl jersey is its mirror.
+#[test]
+fn jersey_curls_as_jersey_does() {
+    let [sides, ends] = rims(&relaxed("stockinette"));
+    println!("stockinette: sides {sides:.2}, ends {ends:.2} loop widths towards the front");
+    assert!(ends > 0.5, "{ends}");
+    assert!(sides < -0.2, "{sides}");
+    let [sides, ends] = rims(&relaxed("reverse stockinette"));
+    println!("reverse: sides {sides:.2}, ends {ends:.2}");
+    assert!(ends < -0.5, "{ends}");
+    assert!(sides > 0.2, "{sides}");
+}
+
+/// A plain weave pulled along one family is `N` straight yarns: `F = N k_s eps`.
+#[test]
+fn a_weave_pulled_along_its_yarns_is_as_stiff_as_they_are() {
+    let yarns = r#"{"weave": "plain", "warp_pitch": 0.001, "radius": 0.00025, "young": 1e7}"#;
+    let mut sim = sim(&patch(yarns, 0.01, 0.02, WHOLE), 0.0, &[]);
+    let mesh = sim.yarns().expect("yarns").clone();
+    let high = mesh.uv.iter().fold(mesh.uv[0], |m, p| m.sup(p));
+    let strain = 0.005;
+    let at = |y: f64| -> Vec<u32> {
+        let list = (0..).zip(&mesh.uv);
+        list.filter(|(_, p)| (p.y - y).abs() < 1e-6)
+            .map(|p| p.0)
+            .collect()
+    };
+    let (bottom, top) = (at(0.0), at(high.y));
+    assert!(bottom.len() >= 9 && top.len() == bottom.len(), "{bottom:?}");
+    let targets: Vec<[f64; 3]> = top
+        .iter()
+        .map(|n| {
+            let x = sim.yarn_nodes()[*n as usize];
+            [x.x, x.y + strain * high.y, x.z]
+        })
+        .collect();
+    sim.pin_yarn_nodes(&bottom, None).expect("pin");
+    sim.pin_yarn_nodes(&top, Some(&targets)).expect("pin");
+    let options = DrapeOptions {
+        force_tolerance: 1e-7,
+        max_steps: 0,
+    };
+    let report = sim.drape(&options, &mut |_| true).expect("drape");
+    assert_eq!(report.outcome, Outcome::Converged, "{report:?}");
+    let tensions = sim.yarn_tensions();
+    let force: f64 = (0..mesh.incidences.len())
+        .filter(|i| bottom.contains(&mesh.incidences[*i].node))
+        .map(|i| tensions[i])
+        .sum();
+    let stiffness = 1e7 * std::f64::consts::PI * 0.00025_f64.powi(2);
+    let expected = bottom.len() as f64 * stiffness * strain;
+    println!("force {force:.6} N, {expected:.6} N expected");
+    assert!((force / expected - 1.0).abs() < 1e-3, "{force} {expected}");
+    // vertices of the panel follow the yarns
+    let top_vertex = sim.locate(0, [0.005, 0.02]).expect("vertex");
+    let y = sim.positions()[top_vertex as usize].y;
+    assert!((y - 0.02 * (1.0 + strain)).abs() < 2e-5, "{y}");
+    assert!(sim.active_vertices().iter().all(|a| !a));
+}
+
+/// What hangs weighs what it is made of.
+#[test]
+fn a_hung_weave_carries_its_weight() {
+    let yarns = r#"{"weave": "plain", "warp_pitch": 0.001, "radius": 0.00025, "density": 2e-4}"#;
+    let mut sim = sim(&patch(yarns, 0.01, 0.015, WHOLE), -9.81, &[]);
+    let mesh = sim.yarns().expect("yarns").clone();
+    let high = mesh.uv.iter().fold(mesh.uv[0], |m, p| m.sup(p));
+    let top: Vec<u32> = (0..)
+        .zip(&mesh.uv)
+        .filter(|(_, p)| p.y > high.y - 1e-6)
+        .map(|p| p.0)
+        .collect();
+    sim.pin_yarn_nodes(&top, None).expect("pin");
+    let options = DrapeOptions {
+        force_tolerance: 1e-8,
+        max_steps: 0,
+    };
+    let report = sim.drape(&options, &mut |_| true).expect("drape");
+    assert_eq!(report.outcome, Outcome::Converged, "{report:?}");
+    let length: f64 = (0..mesh.yarn_count())
+        .map(|y| mesh.yarn(y).last().unwrap().u - mesh.yarn(y)[0].u)
+        .sum();
+    let held: Vec<usize> = top.iter().map(|n| *n as usize).collect();
+    let tensions = sim.yarn_tensions();
+    // warp yarns run along v and end at the held rim
+    let mut pull = 0.0;
+    for y in 0..mesh.yarn_count() {
+        let range = mesh.starts[y] as usize..mesh.starts[y + 1] as usize;
+        let (first, last) = (range.start, range.end - 1);
+        if held.contains(&(mesh.incidences[last].node as usize)) {
+            pull += tensions[last - 1];
+        } else if held.contains(&(mesh.incidences[first].node as usize)) {
+            pull += tensions[first];
+        }
+    }
+    let weight = 2e-4 * 9.81 * length;
+    println!("pull {pull:.6e} N, weight {weight:.6e} N");
+    // half of the topmost segments hangs on the pins itself
+    assert!((pull / weight - 1.0).abs() < 0.05, "{pull} {weight}");
+}
+
+/// The same bits for any number of threads, and after a snapshot is restored, sliding included.
+#[test]
+fn sliding_yarns_have_the_same_bits_however_they_are_run() {
+    let text = knit("stockinette", 5);
+    let run = |threads: f64| {
+        let mut sim = sim(&text, 0.0, &[("solver.threads", threads)]);
+        for _ in 0..4 {
+            let _ = sim.step(1e-3).expect("step");
+        }
+        sim
+    };
+    let (one, two) = (run(1.0), run(2.0));
+    assert_eq!(one.yarn_nodes(), two.yarn_nodes());
+    assert_eq!(one.yarn_coordinates(), two.yarn_coordinates());
+    assert!(one.yarn_slips().iter().any(|s| s.abs() > 1e-9));
+    let bytes = one.save().expect("bytes");
+    let mut again = sim(&text, 0.0, &[("solver.threads", 1.0)]);
+    again.restore(&bytes).expect("restore");
+    let mut one = one;
+    for _ in 0..3 {
+        let _ = one.step(1e-3).expect("step");
+        let _ = again.step(1e-3).expect("step");
+    }
+    assert_eq!(one.yarn_nodes(), again.yarn_nodes());
+    assert_eq!(one.yarn_coordinates(), again.yarn_coordinates());
+}
+
+/// A region that covers a panel in part, or cloth that is not of yarns, is refused with its name.
+#[test]
+fn regions_that_cannot_be_simulated_are_refused() {
+    let part = patch(
+        r#"{"preset": "jersey"}"#,
+        0.03,
+        0.03,
+        "[[0, 0], [0.01, 0], [0.01, 0.03], [0, 0.03]]",
+    );
+    let garment = garment_from_json(&part, None).expect("garment");
+    let error = Sim::new(&garment, &SimOptions::default()).err().unwrap();
+    assert!(error.message.contains("'p' in part"), "{}", error.message);
+    let mut plain = garment;
+    plain.fabrics[0].yarns = None;
+    let error = Sim::new(&plain, &SimOptions::default()).err().unwrap();
+    assert!(error.message.contains("no yarns"), "{}", error.message);
+    let mut sim = sim(&knit("garter", 4), 0.0, &[]);
+    let count = sim.yarn_nodes().len() as u32;
+    let error = sim.pin_yarn_nodes(&[count], None).err().unwrap();
+    assert!(
+        error.message.contains("does not exist"),
+        "{}",
+        error.message
+    );
+    let error = sim.pin(&[0], None).err().unwrap();
+    assert!(
+        error.message.contains("follows the yarns"),
+        "{}",
+        error.message
+    );
+    let places = vec![[f64::NAN; 3]];
+    assert!(sim.pin_yarn_nodes(&[0], Some(&places)).is_err());
+}
