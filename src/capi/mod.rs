@@ -50,6 +50,7 @@ pub mod readout;
 pub mod sim;
 pub mod status;
 pub mod types;
+pub mod yarns;
 
 pub use array::*;
 pub use body::*;
@@ -60,3 +61,4 @@ pub use readout::*;
 pub use sim::*;
 pub use status::*;
 pub use types::*;
+pub use yarns::*;

@@ -6,7 +6,7 @@ use super::desc;
 use super::garment::{self, GARMENTS};
 use super::guard::{entry, guard};
 use super::handle::Table;
-use super::input::{self, LARGEST_COUNT};
+use super::input;
 use super::log::{Log, TOILE_LOG_ERROR, TOILE_LOG_INFO, TOILE_LOG_WARNING};
 use super::motion::Watcher;
 use super::output;
@@ -284,46 +284,6 @@ pub unsafe extern "C" fn toile_sim_unpin(
         let limit = vertex_count(sim)?;
         let vertices = input::array(vertices, count, limit, "vertices")?.to_vec();
         write(sim, |sim, _| sim.unpin(&vertices))
-    })
-}
-
-/// Holds nodes of yarns, as toile_sim_pin holds vertices; yarns do not slide where they are held.
-/// TOILE_E_ARGUMENT names a node that does not exist.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn toile_sim_pin_yarn_nodes(
-    sim: *mut toile_sim,
-    nodes: *const u32,
-    count: usize,
-    targets: *const f64,
-) -> toile_status {
-    entry!({
-        SIMS.get(sim.addr())?;
-        let nodes = input::array(nodes, count, LARGEST_COUNT, "nodes")?.to_vec();
-        let targets = if targets.is_null() {
-            None
-        } else {
-            Some(input::points::<3>(
-                targets,
-                count,
-                LARGEST_COUNT,
-                "targets",
-            )?)
-        };
-        write(sim, |sim, _| sim.pin_yarn_nodes(&nodes, targets.as_deref()))
-    })
-}
-
-/// Lets nodes of yarns go. TOILE_E_ARGUMENT names one that is not held.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn toile_sim_unpin_yarn_nodes(
-    sim: *mut toile_sim,
-    nodes: *const u32,
-    count: usize,
-) -> toile_status {
-    entry!({
-        SIMS.get(sim.addr())?;
-        let nodes = input::array(nodes, count, LARGEST_COUNT, "nodes")?.to_vec();
-        write(sim, |sim, _| sim.unpin_yarn_nodes(&nodes))
     })
 }
 
