@@ -970,7 +970,8 @@ void toile_body_free(struct toile_body *body);
  * Triangulates a garment and makes it ready to move; its vertices stand where the panels are
  * placed. `desc` NULL takes the defaults. The garment may be changed or freed afterwards. Free the
  * simulation with toile_sim_free. TOILE_E_GEOMETRY and TOILE_E_LIMIT name the panel;
- * TOILE_E_UNSUPPORTED: the garment asks for yarns.
+ * TOILE_E_UNSUPPORTED: a blend region covers a panel in part, or a panel of yarns is sewn to one of
+ * triangles.
  */
 toile_status toile_sim_create(const struct toile_garment *garment,
                               const struct toile_sim_desc *desc,
@@ -1036,20 +1037,6 @@ toile_status toile_sim_pin(struct toile_sim *sim,
  * Lets vertices go. TOILE_E_ARGUMENT names one that is not held.
  */
 toile_status toile_sim_unpin(struct toile_sim *sim, const uint32_t *vertices, size_t count);
-
-/**
- * Holds nodes of yarns, as toile_sim_pin holds vertices; yarns do not slide where they are held.
- * TOILE_E_ARGUMENT names a node that does not exist.
- */
-toile_status toile_sim_pin_yarn_nodes(struct toile_sim *sim,
-                                      const uint32_t *nodes,
-                                      size_t count,
-                                      const double *targets);
-
-/**
- * Lets nodes of yarns go. TOILE_E_ARGUMENT names one that is not held.
- */
-toile_status toile_sim_unpin_yarn_nodes(struct toile_sim *sim, const uint32_t *nodes, size_t count);
 
 /**
  * Moves the region in which every yarn is simulated, with the state carried over: a polygon of a
@@ -1238,6 +1225,61 @@ toile_status toile_sim_positions_view(const struct toile_sim *sim, struct toile_
 toile_status toile_sim_velocities_view(const struct toile_sim *sim, struct toile_view_f64 *out);
 
 /**
+ * Vertex of a panel nearest to a point of it, in flat coordinates [m].
+ */
+toile_status toile_sim_locate(const struct toile_sim *sim,
+                              uint32_t panel,
+                              const double uv[2],
+                              uint32_t *out_vertex);
+
+/**
+ * Force [N] and torque [N m] of the cloth on a body at the end of the last step, about the body's
+ * own origin, in world axes. Either may be NULL.
+ */
+toile_status toile_sim_body_wrench(const struct toile_sim *sim,
+                                   uint32_t body,
+                                   double force[3],
+                                   double torque[3]);
+
+/**
+ * A body's surface as it stands in the world now, to draw it: positions [m], shape [count, 3];
+ * sizes as in toile_sim_positions. A plane gives a square.
+ */
+toile_status toile_sim_body_positions(const struct toile_sim *sim,
+                                      uint32_t body,
+                                      double *out,
+                                      size_t capacity,
+                                      size_t *needed);
+
+/**
+ * Triangles of that surface, shape [count, 3]; sizes as in toile_sim_positions.
+ */
+toile_status toile_sim_body_triangles(const struct toile_sim *sim,
+                                      uint32_t body,
+                                      uint32_t *out,
+                                      size_t capacity,
+                                      size_t *needed);
+
+/**
+ * Energies of the present state [J].
+ */
+toile_status toile_sim_energies(const struct toile_sim *sim, struct toile_energies *out);
+
+/**
+ * What was built and what it costs.
+ */
+toile_status toile_sim_info(const struct toile_sim *sim, struct toile_system_info *out);
+
+/**
+ * Name of the linear solver in use, UTF-8. `needed` gets the bytes, the final NUL included; `out`
+ * NULL asks for it.
+ */
+toile_status toile_sim_backend(const struct toile_sim *sim,
+                               char *out,
+                               size_t capacity,
+                               size_t *needed);
+
+/**
  * World positions of the yarns' nodes [m], shape [node_count, 3]; sizes as in toile_sim_positions.
  * Empty in a garment of triangles alone.
  */
@@ -1301,59 +1343,18 @@ toile_status toile_sim_yarn_slips(const struct toile_sim *sim,
                                   size_t *needed);
 
 /**
- * Vertex of a panel nearest to a point of it, in flat coordinates [m].
+ * Holds nodes of yarns, as toile_sim_pin holds vertices; yarns do not slide where they are held.
+ * TOILE_E_ARGUMENT names a node that does not exist.
  */
-toile_status toile_sim_locate(const struct toile_sim *sim,
-                              uint32_t panel,
-                              const double uv[2],
-                              uint32_t *out_vertex);
+toile_status toile_sim_pin_yarn_nodes(struct toile_sim *sim,
+                                      const uint32_t *nodes,
+                                      size_t count,
+                                      const double *targets);
 
 /**
- * Force [N] and torque [N m] of the cloth on a body at the end of the last step, about the body's
- * own origin, in world axes. Either may be NULL.
+ * Lets nodes of yarns go. TOILE_E_ARGUMENT names one that is not held.
  */
-toile_status toile_sim_body_wrench(const struct toile_sim *sim,
-                                   uint32_t body,
-                                   double force[3],
-                                   double torque[3]);
-
-/**
- * A body's surface as it stands in the world now, to draw it: positions [m], shape [count, 3];
- * sizes as in toile_sim_positions. A plane gives a square.
- */
-toile_status toile_sim_body_positions(const struct toile_sim *sim,
-                                      uint32_t body,
-                                      double *out,
-                                      size_t capacity,
-                                      size_t *needed);
-
-/**
- * Triangles of that surface, shape [count, 3]; sizes as in toile_sim_positions.
- */
-toile_status toile_sim_body_triangles(const struct toile_sim *sim,
-                                      uint32_t body,
-                                      uint32_t *out,
-                                      size_t capacity,
-                                      size_t *needed);
-
-/**
- * Energies of the present state [J].
- */
-toile_status toile_sim_energies(const struct toile_sim *sim, struct toile_energies *out);
-
-/**
- * What was built and what it costs.
- */
-toile_status toile_sim_info(const struct toile_sim *sim, struct toile_system_info *out);
-
-/**
- * Name of the linear solver in use, UTF-8. `needed` gets the bytes, the final NUL included; `out`
- * NULL asks for it.
- */
-toile_status toile_sim_backend(const struct toile_sim *sim,
-                               char *out,
-                               size_t capacity,
-                               size_t *needed);
+toile_status toile_sim_unpin_yarn_nodes(struct toile_sim *sim, const uint32_t *nodes, size_t count);
 
 /**
  * Positions of the vertices [m] as they are now, shape [vertex_count, 3], kept as they are until

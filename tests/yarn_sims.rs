@@ -217,6 +217,19 @@ fn regions_that_cannot_be_simulated_are_refused() {
     plain.fabrics[0].yarns = None;
     let error = Sim::new(&plain, &SimOptions::default()).err().unwrap();
     assert!(error.message.contains("no yarns"), "{}", error.message);
+    let sewn = patch(r#"{"preset": "jersey"}"#, 0.03, 0.03, WHOLE).replace(
+        r#""panels": ["#,
+        r#""seams": [{"a": ["p", 1], "b": ["q", 3]}], "panels": [{"name": "q", "fabric": "y",
+            "vertices": [[0, 0], [0.03, 0], [0.03, 0.03], [0, 0.03]],
+            "edges": [[0, 1], [1, 2], [2, 3], [3, 0]]}, "#,
+    );
+    let garment = garment_from_json(&sewn, None).expect("garment");
+    let error = Sim::new(&garment, &SimOptions::default()).err().unwrap();
+    assert!(
+        error.message.contains("sewn to panel 'q' of triangles"),
+        "{}",
+        error.message
+    );
     let mut sim = sim(&knit("garter", 4), 0.0, &[]);
     let count = sim.yarn_nodes().len() as u32;
     let error = sim.pin_yarn_nodes(&[count], None).err().unwrap();

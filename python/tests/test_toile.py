@@ -201,3 +201,40 @@ def test_a_real_pattern_is_read():
     path = Path(data) / "garmentcode" / "gen_tshirt_specification.json"
     garment = toile.Garment.from_file(path)
     assert len(garment.panel_names) > 3
+
+
+def test_yarns_of_a_panel_are_read_and_held():
+    garment = {
+        "toile_garment": 1,
+        "name": "swatch",
+        "edge_length": 0.01,
+        "panels": [
+            {
+                "name": "p",
+                "fabric": "y",
+                "vertices": [[0, 0], [0.02, 0], [0.02, 0.018], [0, 0.018]],
+                "edges": [[0, 1], [1, 2], [2, 3], [3, 0]],
+            }
+        ],
+        "fabrics": [{"name": "y", "yarns": {"preset": "jersey"}}],
+        "blend_regions": [{"panel": "p", "polygon": [[-1, -1], [1, -1], [1, 1], [-1, 1]]}],
+    }
+    with toile.Sim(toile.Garment.from_json(json.dumps(garment))) as sim:
+        x, nodes = sim.yarn_nodes, sim.yarn_indices
+        assert sim.info.yarn_nodes == len(x) > 100
+        assert sim.yarn_offsets[-1] == len(nodes) and nodes.max() < len(x)
+        assert not sim.vertex_active.any()
+        held = nodes[[0, -1]]
+        target = x[held] + [0, 0, 1e-4]
+        sim.pin_yarn_nodes(held, target)
+        sim.step(1e-3)
+        np.testing.assert_array_equal(sim.yarn_nodes[held], target)
+        assert sim.yarn_tensions.shape == sim.yarn_slips.shape == nodes.shape
+        assert sim.yarn_compressions.min() >= 0 and np.abs(sim.yarn_slips).max() > 0
+        for start, end in zip(sim.yarn_offsets, sim.yarn_offsets[1:]):
+            assert (np.diff(sim.yarn_coordinates[start:end]) > 0).all()
+        sim.unpin_yarn_nodes(held)
+        with pytest.raises(toile.ToileError):
+            sim.unpin_yarn_nodes(held)
+        with pytest.raises(ValueError):
+            sim.pin_yarn_nodes(held, target[:1])

@@ -129,6 +129,20 @@ class Sim(_Owner):
         v = _u32(vertices, "vertices").reshape(-1)
         _check(lib.toile_sim_unpin(self.handle, _pointer(v), len(v)))
 
+    def pin_yarn_nodes(self, nodes: Array, targets: Optional[Array] = None) -> None:
+        """Holds nodes of yarns as :meth:`pin` holds vertices; yarns do not slide where they are held."""
+        n = _u32(nodes, "nodes").reshape(-1)
+        x = None if targets is None else _f64(targets, 3, "targets")
+        if x is not None and len(x) != len(n):
+            raise ValueError(f"{len(x)} targets for {len(n)} nodes")
+        pointer = None if x is None else _pointer(x)
+        _check(lib.toile_sim_pin_yarn_nodes(self.handle, _pointer(n), len(n), pointer))
+
+    def unpin_yarn_nodes(self, nodes: Array) -> None:
+        """Lets nodes of yarns go."""
+        n = _u32(nodes, "nodes").reshape(-1)
+        _check(lib.toile_sim_unpin_yarn_nodes(self.handle, _pointer(n), len(n)))
+
     def locate(self, panel: int, uv: Array) -> int:
         """Vertex of a panel nearest to a flat point [m]."""
         out = ctypes.c_uint32()
@@ -230,6 +244,41 @@ class Sim(_Owner):
     def vertex_active(self) -> np.ndarray:
         """0 where a vertex follows the yarns above it, shape (vertices,)."""
         return _copy(lib.toile_sim_vertex_active, np.uint8, self.handle)
+
+    @property
+    def yarn_nodes(self) -> np.ndarray:
+        """Positions of the yarns' nodes [m], shape (nodes, 3); empty without yarns."""
+        return _copy(lib.toile_sim_yarn_nodes, np.float64, self.handle).reshape(-1, 3)
+
+    @property
+    def yarn_offsets(self) -> np.ndarray:
+        """Where each yarn begins in :attr:`yarn_indices`, shape (yarns + 1,)."""
+        return _copy(lib.toile_sim_yarn_offsets, np.uint32, self.handle)
+
+    @property
+    def yarn_indices(self) -> np.ndarray:
+        """Nodes of the yarns, yarn after yarn, shape (passages,)."""
+        return _copy(lib.toile_sim_yarn_indices, np.uint32, self.handle)
+
+    @property
+    def yarn_coordinates(self) -> np.ndarray:
+        """Arc length at rest of each yarn at its nodes [m], shape (passages,)."""
+        return _copy(lib.toile_sim_yarn_coordinates, np.float64, self.handle)
+
+    @property
+    def yarn_tensions(self) -> np.ndarray:
+        """Tension from each passage to the next of its yarn [N], 0 at the last, shape (passages,)."""
+        return _copy(lib.toile_sim_yarn_tensions, np.float64, self.handle)
+
+    @property
+    def yarn_compressions(self) -> np.ndarray:
+        """Largest normal force between two yarns at each node [N], shape (nodes,)."""
+        return _copy(lib.toile_sim_yarn_compressions, np.float64, self.handle)
+
+    @property
+    def yarn_slips(self) -> np.ndarray:
+        """How far each yarn has slid since it was laid [m], shape (passages,)."""
+        return _copy(lib.toile_sim_yarn_slips, np.float64, self.handle)
 
     @property
     def epoch(self) -> int:

@@ -13,8 +13,8 @@ const TURN: f64 = 0.1;
 /// Tolerance over the size of the panel.
 const TOLERANCE: f64 = 1e-6;
 
-/// For each panel whether it is simulated as yarns alone. A region that covers a panel in part, or one
-/// whose fabric has no yarns, is refused.
+/// For each panel whether it is simulated as yarns alone. A region that covers a panel in part, one
+/// whose fabric has no yarns, and a seam between yarns and triangles are refused.
 pub fn yarn_panels(garment: &Garment) -> Result<Vec<bool>> {
     let mut wanted = vec![false; garment.panels.len()];
     for (k, region) in garment.blend_regions.iter().enumerate() {
@@ -35,6 +35,18 @@ pub fn yarn_panels(garment: &Garment) -> Result<Vec<bool>> {
             .at(place));
         }
         wanted[region.panel as usize] = true;
+    }
+    for (k, seam) in garment.seams.iter().enumerate() {
+        let [a, b] = [seam.a.panel, seam.b.panel].map(|p| p as usize);
+        if wanted[a] != wanted[b] {
+            let (yarns, triangles) = if wanted[a] { (a, b) } else { (b, a) };
+            return Err(Error::unsupported(format!(
+                "panel '{}' of yarns is sewn to panel '{}' of triangles; this version sews yarns to \
+                 yarns: give both panels a region, or neither",
+                garment.panels[yarns].name, garment.panels[triangles].name
+            ))
+            .at(format!("seams[{k}]")));
+        }
     }
     Ok(wanted)
 }

@@ -42,7 +42,7 @@ pub fn has(program: &str) -> bool {
 }
 
 /// Source files of the C interface in the order of the header.
-pub const SOURCES: [&str; 10] = [
+pub const SOURCES: [&str; 11] = [
     "status.rs",
     "log.rs",
     "types.rs",
@@ -52,6 +52,7 @@ pub const SOURCES: [&str; 10] = [
     "sim.rs",
     "motion.rs",
     "readout.rs",
+    "yarns.rs",
     "array.rs",
 ];
 

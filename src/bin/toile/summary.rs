@@ -25,6 +25,9 @@ pub(crate) struct Summary {
     peak_memory: Option<u64>,
 }
 
+/// Gap of a seam that is no longer sewn [m].
+const OPEN_SEAM: f64 = 2e-3;
+
 impl Summary {
     pub(crate) fn new(scene: &Scene) -> Self {
         Self {
@@ -47,6 +50,27 @@ impl Summary {
     }
 
     /// Every key of `summary.json`; a number that is not finite becomes null.
+    /// What a garment that is dressed as it should be does not have.
+    fn doubts(&self, last: &StepReport) -> Vec<String> {
+        let mut doubts = Vec::new();
+        if last.max_seam_gap > OPEN_SEAM {
+            doubts.push(format!(
+                "a seam is open by {:.1} mm: the garment is not sewn shut, as where it is placed wrongly or \
+                 too tight",
+                1e3 * last.max_seam_gap
+            ));
+        }
+        for (count, what) in [
+            (self.body_crossings, "a body"),
+            (self.self_crossings, "the garment itself"),
+        ] {
+            if count > 0 {
+                doubts.push(format!("{count} edges of the garment pass through {what}"));
+            }
+        }
+        doubts
+    }
+
     pub(crate) fn to_json(&self, sim: &Sim, last: &StepReport) -> Value {
         let info = sim.info();
         let mut map = Map::new();
@@ -88,7 +112,9 @@ impl Summary {
         put("factor_bytes", json!(info.factor_bytes));
         put("threads", json!(self.threads as u64));
         put("backend", json!(info.backend));
-        put("notes", json!(info.notes));
+        let mut notes = info.notes;
+        notes.extend(self.doubts(last));
+        put("notes", json!(notes));
         put("version", json!(env!("CARGO_PKG_VERSION")));
         Value::Object(map)
     }
