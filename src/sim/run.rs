@@ -155,9 +155,11 @@ impl Sim {
         if self.garment.panels.is_empty() {
             return Ok(levels);
         }
-        for k in (1..=self.settings.drape_levels as i32).rev() {
+        // yarns begin on the whole mesh of triangles
+        let finest = i32::from(self.yarns.is_none());
+        for k in (finest..=self.settings.drape_levels as i32).rev() {
             let scale = COARSENING.powi(k);
-            if (self.mesh.uv.len() as f64) / (scale * scale) < SMALLEST_LEVEL {
+            if k > 0 && (self.mesh.uv.len() as f64) / (scale * scale) < SMALLEST_LEVEL {
                 continue;
             }
             let mesh =
