@@ -58,6 +58,14 @@ const NEARLY_CLOSED: f64 = 8e-3;
 /// How often the pull is doubled.
 const DOUBLINGS: usize = 5;
 
+/// How far below the surface the core of a body begins that seams are closed around [m], in how many
+/// pieces that grows back, and steps for each.
+const CORE: f64 = 0.03;
+const GROWTHS: u32 = 12;
+const GROWTH_STEPS: u64 = 20;
+/// Depth in a body beyond which cloth is on the wrong side of a limb [m].
+const SUNK: f64 = 1e-3;
+
 /// A gap at which the seams count as closed [m].
 const CLOSED: f64 = 1e-3;
 
@@ -108,7 +116,7 @@ pub fn drape(
             carried = Some((coarse, coarse_state));
             break;
         }
-        carried = is_uncrossed(&coarse, &coarse_state)?.then_some((coarse, coarse_state));
+        carried = may_go_on(&coarse, &coarse_state)?.then_some((coarse, coarse_state));
     }
     // a drape that was stopped while it sewed goes on with that
     let open = engine.system.largest_seam_gap(&state.positions) > NEARLY_CLOSED;
@@ -195,9 +203,13 @@ fn place_bodies(state: &mut State) {
     }
 }
 
-/// Whether a coarse level may be carried on: a fold that passes through the cloth would stay for
-/// good, since contact does not uncross. The next level is sewn from where the panels are placed then.
-fn is_uncrossed(coarse: &Engine, state: &State) -> Result<bool> {
+/// Whether a coarse level may be carried on: a seam that a limb keeps open, or a fold that passes
+/// through the cloth would stay for good, since contact does not undo it. The next level is sewn from
+/// where the panels are placed then.
+fn may_go_on(coarse: &Engine, state: &State) -> Result<bool> {
+    if coarse.system.largest_seam_gap(&state.positions) > NEARLY_CLOSED {
+        return Ok(false);
+    }
     if coarse.settings.self_contact < 0.5 {
         return Ok(true);
     }
@@ -337,7 +349,9 @@ fn sew(
     let smooth = engine.system.bodies.with_friction(0.0);
     let rough = std::mem::replace(&mut engine.system.bodies, smooth);
     let settings = engine.settings.clone();
-    let done = close(engine, state, &options, all, watch);
+    let placed = state.positions.clone();
+    let done = close(engine, state, &options, all, watch)
+        .and_then(|()| close_around(engine, state, placed, &options, all, watch));
     engine.system.bodies = rough;
     state.gravity = gravity;
     state.body_anchors.clear();
@@ -345,6 +359,52 @@ fn sew(
     done?;
     restored?;
     Ok(!all.is_over())
+}
+
+/// Sews a garment that stayed open from its placement again, around bodies of which only the core is
+/// left, and lets these grow while the seams hold: a limb that stands in the way of a seam, as where
+/// sleeves are placed beside an arm, is passed on the side on which its axis lies.
+fn close_around(
+    engine: &mut Engine,
+    state: &mut State,
+    placed: Vec<Vec3>,
+    options: &RelaxOptions,
+    all: &mut Relaxed,
+    watch: &mut Watch<'_>,
+) -> Result<()> {
+    let gap = engine.system.largest_seam_gap(&state.positions);
+    if all.is_over() || state.bodies.is_empty() || gap < NEARLY_CLOSED {
+        return Ok(());
+    }
+    let stuck = state.positions.clone();
+    let whole = engine.system.bodies.clone();
+    state.positions = placed;
+    state.body_anchors.clear();
+    state.pair_anchors.clear();
+    for k in 0..=GROWTHS {
+        let inset = CORE * f64::from(GROWTHS - k) / f64::from(GROWTHS);
+        engine.system.bodies = whole.shrunk(inset);
+        if k == 0 {
+            close(engine, state, options, all, watch)?;
+        } else {
+            let options = RelaxOptions {
+                seam_gap: 0.0,
+                max_steps: options.max_steps.min(GROWTH_STEPS),
+                ..*options
+            };
+            stage(engine, state, &options, SEW, "sew", all, watch)?;
+        }
+        if all.is_over() {
+            break;
+        }
+    }
+    engine.system.bodies = whole;
+    let system = &engine.system;
+    let sunk = system.smallest_gap(&state.positions) < (-SUNK).min(system.smallest_gap(&stuck));
+    if sunk || system.largest_seam_gap(&state.positions) > gap {
+        state.positions = stuck;
+    }
+    Ok(())
 }
 
 /// Sews with the pull of the settings; a seam that stays open under it, because the garment is
