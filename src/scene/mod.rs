@@ -9,8 +9,9 @@ pub mod motion;
 pub mod read;
 pub mod schema;
 
-use crate::body::Body;
+use crate::body::{Body, Pose};
 use crate::error::{Error, Result};
+use crate::math::Vec3;
 use crate::pattern::Garment;
 use crate::solve::settings::Settings;
 use crate::system::term::ContactSettings;
@@ -58,6 +59,18 @@ pub struct SceneBody {
     pub contact: ContactSettings,
     /// How it moves; without motion, where it stands.
     pub motion: BodyMotion,
+}
+
+impl SceneBody {
+    /// Moves the body, and where it goes over time, by an offset [m].
+    pub fn shift(&mut self, offset: Vec3) {
+        if self.motion.keys.is_empty() {
+            self.motion.keys = BodyMotion::fixed(Pose::default()).keys;
+        }
+        for key in &mut self.motion.keys {
+            key.pose.position += offset;
+        }
+    }
 }
 
 /// Which vertices a pin holds.

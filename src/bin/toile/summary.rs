@@ -55,8 +55,8 @@ impl Summary {
         let mut doubts = Vec::new();
         if last.max_seam_gap > OPEN_SEAM {
             doubts.push(format!(
-                "a seam is open by {:.1} mm: the garment is not sewn shut, as where it is placed wrongly or \
-                 too tight",
+                "a seam is open by {:.1} mm: the garment is not sewn shut, as where it is too tight or \
+                 placed for a body that stands elsewhere (--body-offset moves the body)",
                 1e3 * last.max_seam_gap
             ));
         }
