@@ -124,6 +124,7 @@ impl Model {
         let sizes = Sizes {
             vertices: sim.positions().len(),
             triangles: sim.triangles().len(),
+            nodes: sim.yarn_nodes().len(),
             probes: probes.iter().map(Vec::len).collect(),
         };
         let restored = scene.initial.snapshot.is_some();
