@@ -238,3 +238,35 @@ def test_yarns_of_a_panel_are_read_and_held():
             sim.unpin_yarn_nodes(held)
         with pytest.raises(ValueError):
             sim.pin_yarn_nodes(held, target[:1])
+
+
+LAWN = '{"name": "lawn", "density": 0.08, "membrane": {"warp": 200, "weft": 200, "shear": 40}}'
+
+
+def test_garments_are_edited_and_read():
+    garment = square()
+    assert garment.seam_count == 0 and garment.warnings == []
+    lawn = garment.add_fabric(LAWN)
+    garment.set_panel_fabric(0, lawn)
+    assert garment.panel_index(garment.panel_names[0]) == 0
+    with pytest.raises(toile.ToileError, match="gone"):
+        garment.panel_index("gone")
+    garment.set_blend_region(0, [[0, 0], [0.1, 0], [0.1, 0.1]], rings=3)
+    assert json.loads(garment.to_json())["blend_regions"][0]["rings"] == 3
+    garment.set_blend_region(0, np.empty((0, 2)))
+    assert not json.loads(garment.to_json()).get("blend_regions")
+    garment.set_blend_region(0, [[0, 0], [0.1, 0], [0.1, 0.1]])
+    garment.clear_blend_regions()
+    with toile.Sim(garment) as sim:
+        copy = sim.garment
+        assert copy.to_json() == garment.to_json()
+        assert sim.body_count == 0
+        sim.add_body(toile.Body.sphere(0.1))
+        assert sim.body_count == 1
+        sim.set_gravity((0, 1, 2))
+        sim.set_wind((3, 4, 5))
+        assert [sim[f"gravity.{k}"] for k in "xyz"] == [0, 1, 2]
+        assert [sim[f"wind.{k}"] for k in "xyz"] == [3, 4, 5]
+        sim.set_blend_region(0, np.empty((0, 2)))
+        with pytest.raises(toile.ToileError):
+            sim.set_blend_region(0, [[0, 0], [0.1, 0], [0.1, 0.1]])

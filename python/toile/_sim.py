@@ -102,6 +102,32 @@ class Sim(_Owner):
         x = _f64(positions, 3, "positions")
         _check(lib.toile_sim_set_body_vertices(self.handle, body, _pointer(x), len(x)))
 
+    @property
+    def body_count(self) -> int:
+        """Number of bodies."""
+        out = ctypes.c_uint32()
+        _check(lib.toile_sim_body_count(self.handle, ctypes.byref(out)))
+        return out.value
+
+    @property
+    def garment(self) -> Garment:
+        """A copy of the garment that the simulation was made of."""
+        return Garment._of(lib.toile_sim_garment, self.handle)
+
+    def set_gravity(self, gravity: Array) -> None:
+        """Acceleration of gravity [m/s^2], shape (3,)."""
+        _check(lib.toile_sim_set_gravity(self.handle, _vector(gravity, 3, "gravity")))
+
+    def set_wind(self, wind: Array) -> None:
+        """Velocity of the air [m/s], shape (3,)."""
+        _check(lib.toile_sim_set_wind(self.handle, _vector(wind, 3, "wind")))
+
+    def set_blend_region(self, panel: int, polygon: Array, rings: int = 2) -> None:
+        """Moves the region of a panel in which every yarn is simulated, as
+        :meth:`Garment.set_blend_region` says it; raises where the library cannot do that."""
+        uv = _f64(polygon, 2, "polygon")
+        _check(lib.toile_sim_set_blend_region(self.handle, panel, _pointer(uv), len(uv), rings))
+
     def body_wrench(self, body: int) -> tuple[np.ndarray, np.ndarray]:
         """Force [N] and torque about the body's origin [N m] of the cloth, world axes."""
         force, torque = (ctypes.c_double * 3)(), (ctypes.c_double * 3)()
