@@ -238,7 +238,7 @@ typedef struct toile_garment_desc {
      */
     const char *name;
     /**
-     * Target edge length of the triangles [m]; a panel may have its own. Default 0.02.
+     * Target edge length of the triangles [m]; a panel may have its own. Default 0.015.
      */
     double edge_length;
 } toile_garment_desc;
@@ -1005,8 +1005,8 @@ toile_status toile_sim_set_body_sdf(struct toile_sim *sim,
 /**
  * Says where a body is to be at the end of the next step: position [m] of its origin and rotation
  * x, y, z, w. The cloth feels the velocity that follows. Before the first step or drape it is a
- * placement: the body stands there at once and has no velocity. A drape takes the body to its pose
- * before it begins.
+ * placement: the body stands there at once and has no velocity. A drape takes the body to its pose, and
+ * cloth that rests on it goes along.
  */
 toile_status toile_sim_set_body_pose(struct toile_sim *sim,
                                      uint32_t body,

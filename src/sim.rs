@@ -90,7 +90,7 @@ impl Sim {
         let mut cloth = Cloth::new(garment, mesh.clone())?;
         let masses = cloth.masses.clone();
         let origin = Origin {
-            garment: snapshot::fingerprint(&cloth),
+            garment: snapshot::fingerprint(&cloth, &garment.blend_regions),
             bodies: Vec::new(),
             numbers: options.settings.that_matter(),
         };

@@ -213,8 +213,8 @@ pub unsafe extern "C" fn toile_sim_set_body_sdf(
 
 /// Says where a body is to be at the end of the next step: position [m] of its origin and rotation
 /// x, y, z, w. The cloth feels the velocity that follows. Before the first step or drape it is a
-/// placement: the body stands there at once and has no velocity. A drape takes the body to its pose
-/// before it begins.
+/// placement: the body stands there at once and has no velocity. A drape takes the body to its pose, and
+/// cloth that rests on it goes along.
 ///
 /// cbindgen:ptrs-as-arrays=[[position; 3], [quaternion_xyzw; 4]]
 #[unsafe(no_mangle)]

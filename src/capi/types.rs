@@ -5,6 +5,7 @@ pub use super::log::{TOILE_LOG_ERROR, TOILE_LOG_INFO, TOILE_LOG_WARNING, toile_l
 use super::desc::{self, Versioned};
 use super::guard::entry;
 use super::status::toile_status;
+use crate::pattern::import::DEFAULT_EDGE_LENGTH;
 use std::ffi::{c_char, c_void};
 use std::ptr;
 
@@ -65,7 +66,7 @@ pub struct toile_garment_desc {
     pub struct_size: usize,
     /// Name for people, UTF-8; NULL for none.
     pub name: *const c_char,
-    /// Target edge length of the triangles [m]; a panel may have its own. Default 0.02.
+    /// Target edge length of the triangles [m]; a panel may have its own. Default 0.015.
     pub edge_length: f64,
 }
 
@@ -345,7 +346,7 @@ macro_rules! versioned {
 }
 
 versioned! {
-    toile_garment_desc { name: ptr::null(), edge_length: 0.02 }
+    toile_garment_desc { name: ptr::null(), edge_length: DEFAULT_EDGE_LENGTH }
     toile_panel_desc {
         name: ptr::null(), vertices: ptr::null(), vertex_count: 0, edges: ptr::null(),
         edge_count: 0, edge_kinds: ptr::null(), edge_controls: ptr::null(),

@@ -24,6 +24,10 @@ const MAX_REPEAT: usize = 1000;
 const LEAST_HEIGHT: f64 = 0.4;
 /// Relative slack of the checks of spacing: numbers such as 0.003 and 4 * 0.00075 must agree.
 const SLACK: f64 = 1e-9;
+/// Thinnest and thickest yarn [m].
+const RADII: [f64; 2] = [1e-6, 0.1];
+/// Largest of any other number: a stiffness of diamond in Pa.
+const LARGEST: f64 = 1e12;
 
 /// Which yarn lies in front at the crossings of a weave's repeat.
 #[derive(Clone, Debug, PartialEq)]
@@ -310,6 +314,17 @@ impl YarnFabric {
         for (key, value) in positive {
             if !value.is_finite() || value <= 0.0 {
                 return refuse(key, value, "finite and positive");
+            }
+        }
+        let [thin, thick] = RADII;
+        if !(thin..=thick).contains(&self.radius) {
+            let rule = format!("at least {thin} m, a fibre, and at most {thick} m, a hawser");
+            return refuse("radius", self.radius, &rule);
+        }
+        for (key, value) in positive.iter().chain(&not_negative) {
+            if *value > LARGEST {
+                let rule = format!("at most {LARGEST:e}: no material comes near it");
+                return refuse(key, *value, &rule);
             }
         }
         for (key, value) in not_negative {

@@ -10,6 +10,7 @@ use crate::cloth::Cloth;
 use crate::error::{Error, Result};
 use crate::math::Vec3;
 use crate::math::hash::Hash;
+use crate::pattern::BlendRegion;
 use serde::{Deserialize, Serialize};
 
 const MAGIC: &[u8; 8] = b"TOILESNP";
@@ -41,7 +42,9 @@ impl Origin {
     /// What is not as in `own`, the origin of the simulation that restores.
     fn difference(&self, own: &Self) -> Option<String> {
         if self.garment != own.garment {
-            return Some("it was taken of another garment, resolution or fabric".into());
+            return Some(
+                "it was taken of another garment, resolution, fabric or blend region".into(),
+            );
         }
         if self.bodies.len() != own.bodies.len() {
             return Some(format!(
@@ -90,8 +93,8 @@ impl Origin {
     }
 }
 
-/// A number that two systems share only if their meshes and fabrics are the same.
-pub fn fingerprint(cloth: &Cloth) -> u64 {
+/// A number that two systems share only if their meshes, fabrics and blend regions are the same.
+pub fn fingerprint(cloth: &Cloth, regions: &[BlendRegion]) -> u64 {
     let mut hash = Hash::default();
     for p in &cloth.mesh.uv {
         hash.numbers([p.x, p.y]);
@@ -106,6 +109,13 @@ pub fn fingerprint(cloth: &Cloth) -> u64 {
     }
     for f in &cloth.fabrics {
         hash.add(format!("{f:?}").as_bytes());
+    }
+    for region in regions {
+        hash.add(&region.panel.to_le_bytes());
+        hash.add(&region.rings.to_le_bytes());
+        for p in &region.polygon {
+            hash.numbers([p.x, p.y]);
+        }
     }
     hash.value()
 }
