@@ -11,4 +11,5 @@ pub mod relax;
 pub mod report;
 pub mod rest;
 pub mod settings;
+mod sew;
 pub mod step;
