@@ -14,6 +14,7 @@
 mod common;
 
 use common::{Random, cpu};
+use toile::blend::Riders;
 use toile::body::Distance;
 use toile::math::parallel::Workers;
 use toile::math::{Vec2, Vec3};
@@ -237,7 +238,7 @@ fn main() {
         for term in all {
             let name = term.name();
             let one = [term];
-            let mut assembler = Assembler::new(x.len(), &one);
+            let mut assembler = Assembler::new(x.len(), &one, &Riders::default());
             assembler.add(&one, &at, Some(HessianKind::Psd), &workers, &mut gradient);
             const ROUNDS: u32 = 10;
             let from = cpu();

@@ -8,6 +8,7 @@ mod run;
 mod world;
 mod yarns;
 
+use crate::blend::Riders;
 use crate::body::Body;
 use crate::cloth::Cloth;
 use crate::error::{Error, Result};
@@ -89,17 +90,20 @@ impl Sim {
         finite("pressure", &[options.pressure])?;
         let mut cloth = Cloth::new(garment, mesh.clone())?;
         let masses = cloth.masses.clone();
+        let yarns = YarnPart::new(garment, &mesh, &options.settings)?;
+        if let Some(part) = &yarns {
+            cloth = part.rest_of(garment, &mesh)?;
+        }
         let origin = Origin {
             garment: snapshot::fingerprint(&cloth),
             bodies: Vec::new(),
             numbers: options.settings.that_matter(),
         };
-        let yarns = YarnPart::new(garment, &mesh, &options.settings)?;
-        if let Some(part) = &yarns {
-            cloth = part.rest_of(garment, &mesh)?;
-        }
         let laid = yarns.as_ref().map(|part| part.yarns.clone());
-        let system = System::with_yarns(cloth, laid, &BuildOptions::from(&options.settings))?;
+        let alone = Riders::default();
+        let riders = yarns.as_ref().map_or(&alone, |part| &part.riders);
+        let build = BuildOptions::from(&options.settings);
+        let system = System::with_yarns(cloth, laid, riders, &build)?;
         let mut state = State {
             time: 0.0,
             positions: mesh.placed.clone(),

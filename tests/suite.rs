@@ -58,6 +58,8 @@ mod layering;
 mod licences;
 #[path = "linear_solvers.rs"]
 mod linear_solvers;
+#[path = "mixed_patches.rs"]
+mod mixed_patches;
 #[path = "pattern_bytes.rs"]
 mod pattern_bytes;
 #[path = "pattern_check.rs"]

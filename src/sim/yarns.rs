@@ -1,9 +1,9 @@
 //! Yarns of a simulation: where they are, what holds them, and the vertices that follow them.
 
 use super::{Sim, finite};
-use crate::blend::Follow;
 use crate::blend::embed::carried;
-use crate::blend::region::yarn_panels;
+use crate::blend::region::yarn_triangles;
+use crate::blend::{Direct, Follow, Riders};
 use crate::cloth::Cloth;
 use crate::error::{Error, Result};
 use crate::math::Vec3;
@@ -17,27 +17,32 @@ use crate::yarn::layout::Layout;
 use crate::yarn::{Incidence, YarnMaterial, YarnMesh, Yarns, lay};
 use std::sync::Arc;
 
-/// Yarns and the vertices that they carry.
+/// Yarns, what they ride on, and the vertices that they carry.
 pub(super) struct YarnPart {
     pub(super) yarns: Arc<Yarns>,
-    /// Panels that are simulated as yarns.
-    pub(super) panels: Vec<bool>,
+    /// Nodes that ride on triangles.
+    pub(super) riders: Riders,
+    /// Triangles that the yarns stand for.
+    left_out: Vec<bool>,
+    share: Vec<[f64; 2]>,
+    masses: Vec<Option<f64>>,
     follow: Follow,
 }
 
 impl YarnPart {
-    /// Lays the yarns of the panels that the garment's blend regions cover.
+    /// Lays the yarns of the triangles that the garment's blend regions hold.
     pub(super) fn new(
         garment: &Garment,
         mesh: &GarmentMesh,
         settings: &Settings,
     ) -> Result<Option<Self>> {
-        let panels = yarn_panels(garment)?;
-        let wanted: Vec<u32> = (0..)
-            .zip(&panels)
-            .filter(|(_, w)| **w)
-            .map(|p| p.0)
+        let left_out = yarn_triangles(garment, mesh)?;
+        let mut wanted: Vec<u32> = (left_out.iter().zip(&mesh.triangle_panel))
+            .filter(|(left_out, _)| **left_out)
+            .map(|p| *p.1)
             .collect();
+        wanted.sort_unstable();
+        wanted.dedup();
         if wanted.is_empty() {
             return Ok(None);
         }
@@ -47,26 +52,46 @@ impl YarnPart {
             ..Layout::default()
         };
         let laid = lay(garment, &layout)?;
-        let materials = garment
+        let materials: Vec<YarnMaterial> = garment
             .fabrics
             .iter()
             .map(|f| f.yarns.as_ref().map(YarnMaterial::from).unwrap_or_default())
             .collect();
+        let direct = Direct::new(garment, mesh, &left_out, laid, &materials)?;
+        direct.yarns.check()?;
+        let mut follows = vec![false; mesh.uv.len()];
+        for gone in [true, false] {
+            let list = mesh.triangles.iter().zip(&left_out);
+            for (tri, _) in list.filter(|(_, left_out)| **left_out == gone) {
+                for v in tri {
+                    follows[*v as usize] = gone;
+                }
+            }
+        }
         let reach = |panel: u32| garment.panel_edge_length(&garment.panels[panel as usize]);
-        let follow = Follow::new(mesh, &laid, &panels, reach)?;
+        let follow = Follow::new(mesh, &direct.yarns, &follows, reach)?;
         Ok(Some(Self {
             yarns: Arc::new(Yarns {
-                mesh: laid,
+                mesh: direct.yarns,
                 materials,
             }),
-            panels,
+            riders: direct.riders,
+            left_out,
+            share: direct.share,
+            masses: direct.masses,
             follow,
         }))
     }
 
     /// The cloth without the triangles that the yarns stand for.
     pub(super) fn rest_of(&self, garment: &Garment, mesh: &GarmentMesh) -> Result<Cloth> {
-        Cloth::new(garment, mesh.without_triangles_of(&self.panels))
+        let kept: Vec<usize> = (0..self.left_out.len())
+            .filter(|t| !self.left_out[*t])
+            .collect();
+        let share: Vec<[f64; 2]> = kept.iter().map(|t| self.share[*t]).collect();
+        let masses: Vec<_> = kept.iter().map(|t| self.masses[*t]).collect();
+        let mesh = mesh.without_triangles(&self.left_out);
+        Cloth::covered(garment, mesh, &share, &masses)
     }
 
     /// Adds the nodes, where the panels are placed, to a state of the vertices.
@@ -89,10 +114,11 @@ impl YarnPart {
         self.carry(state);
     }
 
-    /// Lets the vertices follow.
+    /// Lets riders ride and vertices follow.
     pub(super) fn carry(&self, state: &mut State) {
         let first = state.positions.len() - self.yarns.mesh.uv.len();
         for values in [&mut state.positions, &mut state.velocities] {
+            self.riders.carry(values);
             let (vertices, nodes) = values.split_at_mut(first);
             self.follow.apply(nodes, vertices);
         }
@@ -105,6 +131,7 @@ impl YarnPart {
             let nodes = carried(mesh, &values[..first], &self.yarns.mesh)?;
             values.truncate(first);
             values.extend(nodes);
+            self.riders.carry(values);
         }
         Ok(())
     }
@@ -165,7 +192,8 @@ impl Sim {
         )
     }
 
-    /// Tension between each incidence and the next of its yarn [N]; 0 at the last.
+    /// Tension between each incidence and the next of its yarn [N]; 0 at the last, and where triangles
+    /// stand for the yarn.
     pub fn yarn_tensions(&self) -> Vec<f64> {
         let Some(part) = &self.yarns else {
             return Vec::new();
@@ -175,7 +203,11 @@ impl Sim {
         for y in 0..mesh.yarn_count() {
             let stiffness = part.yarns.material(y).stretch;
             for i in mesh.starts[y] as usize + 1..mesh.starts[y + 1] as usize {
-                let [a, b] = [i - 1, i].map(|i| x[mesh.incidences[i].node as usize]);
+                let nodes = [i - 1, i].map(|i| mesh.incidences[i].node);
+                if !mesh.reaches(&nodes) {
+                    continue;
+                }
+                let [a, b] = nodes.map(|n| x[n as usize]);
                 let du = self.state.u[i] - self.state.u[i - 1];
                 out[i - 1] = stiffness * ((b - a).norm() / du - 1.0);
             }
@@ -227,6 +259,13 @@ impl Sim {
             for (n, t) in nodes.iter().zip(targets) {
                 finite(&format!("target of yarn node {n}"), t)?;
             }
+        }
+        if let Some(part) = &self.yarns
+            && let Some(n) = nodes.iter().find(|n| part.riders.rides(first + **n))
+        {
+            return Err(Error::argument(format!(
+                "yarn node {n} rides on triangles: hold vertices there"
+            )));
         }
         for (k, node) in nodes.iter().enumerate() {
             self.hold(first + node, targets.map(|t| Vec3::from(t[k])));

@@ -76,7 +76,7 @@ impl Engine {
     /// A solver for a system.
     pub fn new(system: System, settings: &Settings) -> Self {
         let n = system.block_count();
-        let assembler = Assembler::new(n, &system.terms);
+        let assembler = Assembler::new(n, &system.terms, &system.points.riders);
         let workers = Workers::new(settings.threads as usize);
         let linear = linear_solver(&system, settings, &workers);
         Self {
@@ -196,10 +196,15 @@ impl Engine {
                 x[i] = place;
             }
         }
+        let riders = &self.system.points.riders;
+        riders.carry(&mut x);
         self.carry.way.clear();
         if rest {
             self.carry
                 .take_along(state, &self.center, &self.fixed, &self.system.bodies);
+            if !self.carry.way.is_empty() {
+                riders.carry(&mut self.carry.way);
+            }
         }
         let n = x.len();
         let system = &mut self.system;
@@ -237,6 +242,7 @@ impl Engine {
                 measure: &self.measure,
             },
             fixed: &self.fixed,
+            riders: &system.points.riders,
             idle: &self.idle,
             workers: &self.workers,
         };
@@ -303,6 +309,7 @@ impl Engine {
             for pin in &state.pins {
                 x[pin.vertex as usize] = self.center[pin.vertex as usize];
             }
+            problem.riders.carry(&mut x);
             // where that costs energy everything but the pins is left behind
             if let Some(answer) = answer.1
                 && problem.value(&answer) <= problem.value(&x)
@@ -356,7 +363,7 @@ impl Engine {
     }
 
     /// The quadratic part of a substep's potential. The terms of yarns bring their own inertia, which
-    /// is not diagonal; a relaxation takes lumped masses in its place.
+    /// is not diagonal; a relaxation takes lumped masses in its place, those of riders on the vertices that carry them.
     fn set_inertia(&mut self, state: &State, h: f64, dynamic: bool) {
         let system = &self.system;
         let points = &system.points;
@@ -377,6 +384,18 @@ impl Engine {
                 self.center[i] += state.velocities[i] * (h / (1.0 + alpha * h));
             }
             self.fixed[i] = !points.moves(i);
+        }
+        for rider in points.riders.list() {
+            let own = self.measure[rider.point as usize];
+            for (v, w) in rider.vertices.iter().zip(&rider.weights) {
+                // a rider just outside of its triangle has a weight below zero
+                let part = w.max(0.0) * own;
+                self.measure[*v as usize] += part;
+                if !dynamic {
+                    self.weight[*v as usize] += part;
+                }
+            }
+            self.weight[rider.point as usize] = 0.0;
         }
         let unknowns = &system.unknowns;
         for (k, owner) in unknowns.owners.iter().enumerate() {

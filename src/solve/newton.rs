@@ -8,6 +8,7 @@
 //! uses the same with `v0 = 0`. No step is accepted that raises `Phi`.
 
 use super::linear::{LinearError, LinearSolver};
+use crate::blend::Riders;
 use crate::error::{Error, Result, Status};
 use crate::math::Vec3;
 use crate::math::block::BlockMatrix;
@@ -90,8 +91,10 @@ pub struct Problem<'a> {
     pub inv_dt: f64,
     /// Quadratic part.
     pub inertia: Inertia<'a>,
-    /// Vertices that keep their place.
+    /// Vertices that keep their place, and points that ride.
     pub fixed: &'a [bool],
+    /// Points that ride on vertices.
+    pub riders: &'a Riders,
     /// Block and component of entries that nothing depends on.
     pub idle: &'a [(u32, u8)],
     /// Threads.
@@ -229,6 +232,7 @@ impl Problem<'_> {
                 .prepare(matrix)
                 .and_then(|()| linear.solve(matrix, &work.negative, &mut work.direction, 0.0));
             if solved.is_ok() {
+                self.riders.carry(&mut work.direction);
                 // the rows of fixed vertices have no answer
                 let moved = x.iter().zip(way).zip(&work.direction);
                 return (tried, Some(moved.map(|((x, w), d)| x + w + d).collect()));
@@ -304,6 +308,7 @@ impl Problem<'_> {
                 });
                 match solved {
                     Ok(iterations) => {
+                        self.riders.carry(&mut work.direction);
                         summary.linear_iterations += u64::from(iterations);
                         summary.exactness = kind.exactness();
                         break;

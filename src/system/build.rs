@@ -17,6 +17,7 @@ use super::term::{Bodies, Term};
 use super::yarn::contacts::{Contacts, Sliding};
 use super::yarn::unknowns::Unknowns;
 use super::yarn::{self, YarnOptions};
+use crate::blend::Riders;
 use crate::cloth::Cloth;
 use crate::error::Result;
 use crate::math::parallel::Workers;
@@ -83,16 +84,21 @@ impl From<&BuildOptions> for YarnOptions {
 impl System {
     /// Compiles a garment of triangles alone; bodies come later.
     pub fn new(cloth: Cloth, options: &BuildOptions) -> Result<Self> {
-        Self::with_yarns(cloth, None, options)
+        Self::with_yarns(cloth, None, &Riders::default(), options)
     }
 
-    /// Compiles a garment whose yarns are simulated where the cloth has no triangles.
+    /// Compiles a garment whose yarns are simulated where the cloth has no triangles; at the border
+    /// some of their nodes ride on triangles.
     pub fn with_yarns(
         cloth: Cloth,
         yarns: Option<Arc<Yarns>>,
+        riders: &Riders,
         options: &BuildOptions,
     ) -> Result<Self> {
-        let points = Points::new(&cloth, yarns.as_deref());
+        let points = Points {
+            riders: riders.clone(),
+            ..Points::new(&cloth, yarns.as_deref())
+        };
         let sliding = vec![false; yarns.as_ref().map_or(0, |y| y.mesh.incidences.len())];
         let unknowns = unknowns(&cloth, yarns.as_deref(), &sliding)?;
         let yarn_options = YarnOptions::from(options);
@@ -166,10 +172,11 @@ impl System {
         }
     }
 
-    /// Values of all blocks in a state.
+    /// Values of all blocks in a state, riders where their triangles are.
     pub fn pack(&self, state: &State, x: &mut Vec<Vec3>) {
         x.clear();
         x.extend_from_slice(&state.positions);
+        self.points.riders.carry(x);
         x.resize(self.block_count(), Vec3::zeros());
         for (u, slot) in state.u.iter().zip(&self.unknowns.slides) {
             if let Some((block, c)) = slot {
@@ -222,6 +229,8 @@ impl System {
         let links = mesh.seams.iter().flat_map(|s| &s.links);
         let sewn = links.flat_map(|l| [[l.vertex, l.edge[0]], [l.vertex, l.edge[1]]]);
         let node = |n| self.unknowns.node(n);
+        let riders = self.points.riders.list().iter();
+        let ridden = riders.flat_map(|r| r.vertices.map(|v| [r.point, v]));
         let yarns = self.yarns.iter().flat_map(|y| {
             let ties = y.mesh.ties.iter().map(|t| [t.node, t.segment[0]]);
             (0..y.mesh.yarn_count())
@@ -230,7 +239,8 @@ impl System {
                 .chain(ties)
                 .map(|pair| pair.map(node))
         });
-        for [a, b] in self.edges.iter().copied().chain(sewn).chain(yarns) {
+        let links = self.edges.iter().copied().chain(sewn).chain(ridden);
+        for [a, b] in links.chain(yarns) {
             let (a, b) = (find(&mut root, a), find(&mut root, b));
             root[a.max(b) as usize] = a.min(b);
         }

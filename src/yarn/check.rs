@@ -91,6 +91,15 @@ impl YarnMesh {
                 return refuse(format!("node {k} at ({}, {}, {lift})", uv.x, uv.y));
             }
         }
+        if ![0, nodes].contains(&self.outside.len()) {
+            return refuse(format!(
+                "outside has {} entries, must have none or {nodes}",
+                self.outside.len()
+            ));
+        }
+        if let Some(bad) = self.across.iter().find(|a| a.node as usize >= nodes) {
+            return refuse(format!("across: node {} of {nodes}", bad.node));
+        }
         Ok(())
     }
 
@@ -142,7 +151,8 @@ impl YarnMesh {
                 .windows(2)
                 .filter(|w| w[0].group != w[1].group)
                 .count();
-            if stack.is_empty() || changes > 1 || (stack.len() > 1 && changes == 0) {
+            let beside = stack.len() > 1 && changes == 0;
+            if stack.is_empty() || changes > 1 || (beside && self.is_inside(node as u32)) {
                 return refuse(format!(
                     "node {node}: {} strands in {} groups",
                     stack.len(),

@@ -31,6 +31,7 @@ impl Engine {
                     center: &engine.center,
                 },
                 fixed: &engine.fixed,
+                riders: &engine.system.points.riders,
                 idle: &engine.idle,
                 workers: &engine.workers,
             };

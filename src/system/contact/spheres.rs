@@ -31,7 +31,8 @@
 //!
 //! # Yarns
 //!
-//! A node's sphere has the radius of the yarn. Segments are ways like edges; nodes of one panel are
+//! A node's sphere has the radius of the yarn. Segments are ways like edges, and so is the way from a node that rides
+//! on a triangle to the triangle's vertices; a node and another point of its panel are
 //! neighbours if the straight line between them is short, since yarns of one layer touch.
 
 use crate::cloth::Cloth;
@@ -109,7 +110,16 @@ impl Spheres {
             starts: vec![0],
             partners: Vec::new(),
         };
-        spheres.exclude(&Flat::new(cloth, yarns), &ways(cloth, &edges, yarns));
+        let mut ways = ways(cloth, &edges, yarns);
+        for rider in points.riders.list() {
+            let place = |v: u32| uv[v as usize];
+            let carried = rider.vertices.iter().zip(&rider.weights);
+            let own: Vec2 = carried.map(|(v, w)| place(*v) * *w).sum();
+            for v in rider.vertices {
+                ways.push((rider.point, v, (place(v) - own).norm()));
+            }
+        }
+        spheres.exclude(&Flat::new(cloth, yarns), &ways);
         Ok(spheres)
     }
 
@@ -226,10 +236,10 @@ impl<'a> Flat<'a> {
         }
     }
 
-    /// Length of the straight line between points of one panel, and whether both are nodes.
+    /// Length of the straight line between points of one panel, and whether one is a node.
     fn line(&self, a: u32, b: u32) -> Option<(f64, bool)> {
         let (a, b) = (self.place(a), self.place(b));
-        (a.0 == b.0).then(|| ((b.1 - a.1).norm(), a.2 && b.2))
+        (a.0 == b.0).then(|| ((b.1 - a.1).norm(), a.2 || b.2))
     }
 }
 

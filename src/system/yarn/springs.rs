@@ -55,7 +55,8 @@ fn yarns(mesh: &YarnMesh) -> Vec<u32> {
     out
 }
 
-/// Every run of `n` incidences that follow each other in a yarn, with the yarn's material.
+/// Every run of `n` incidences that follow each other in a yarn, with the yarn's material; only those
+/// with a node inside.
 fn runs<const N: usize>(
     mesh: &YarnMesh,
     materials: &[YarnMaterial],
@@ -67,7 +68,9 @@ fn runs<const N: usize>(
         for i in from..(to + 1).saturating_sub(N) {
             let incidences: [u32; N] = std::array::from_fn(|k| (i + k) as u32);
             let nodes = incidences.map(|i| mesh.incidences[i as usize].node);
-            f(incidences, nodes, m);
+            if mesh.reaches(&nodes) {
+                f(incidences, nodes, m);
+            }
         }
     }
     Ok(())
@@ -199,7 +202,8 @@ pub(super) fn spacings(
         let m = material_of(mesh, materials, y)?;
         for i in mesh.starts[y] as usize + 1..mesh.starts[y + 1] as usize {
             let laid = mesh.incidences[i].u - mesh.incidences[i - 1].u;
-            if !spaced[i - 1] {
+            let nodes = [i - 1, i].map(|i| mesh.incidences[i].node);
+            if !spaced[i - 1] && mesh.reaches(&nodes) {
                 let kernel = Spacing {
                     stiffness: m.spacing * laid,
                     least: CLOSEST * laid,
