@@ -68,6 +68,7 @@ fn with_sim(sim: *mut toile_sim) -> Vec<(&'static str, toile_status)> {
         toile_sim_yarn_tensions(ptr::null_mut(), 0, n),
         toile_sim_yarn_compressions(ptr::null_mut(), 0, n),
         toile_sim_yarn_slips(ptr::null_mut(), 0, n),
+        toile_sim_yarn_active(ptr::null_mut(), 0, n),
         toile_sim_body_positions(0, ptr::null_mut(), 0, n),
         toile_sim_body_triangles(0, ptr::null_mut(), 0, n),
         toile_sim_energies(&mut energies),

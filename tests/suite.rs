@@ -58,8 +58,14 @@ mod layering;
 mod licences;
 #[path = "linear_solvers.rs"]
 mod linear_solvers;
+#[path = "mixed_hard.rs"]
+mod mixed_hard;
 #[path = "mixed_patches.rs"]
 mod mixed_patches;
+#[path = "mixed_pucker.rs"]
+mod mixed_pucker;
+#[path = "mixed_riders.rs"]
+mod mixed_riders;
 #[path = "pattern_bytes.rs"]
 mod pattern_bytes;
 #[path = "pattern_check.rs"]

@@ -201,35 +201,14 @@ fn sliding_yarns_have_the_same_bits_however_they_are_run() {
     assert_eq!(one.yarn_coordinates(), again.yarn_coordinates());
 }
 
-/// A region that covers a panel in part, or cloth that is not of yarns, is refused with its name.
+/// Cloth that is not of yarns, and nodes and vertices that cannot be held, are refused by name.
 #[test]
-fn regions_that_cannot_be_simulated_are_refused() {
-    let part = patch(
-        r#"{"preset": "jersey"}"#,
-        0.03,
-        0.03,
-        "[[0, 0], [0.01, 0], [0.01, 0.03], [0, 0.03]]",
-    );
-    let garment = garment_from_json(&part, None).expect("garment");
-    let error = Sim::new(&garment, &SimOptions::default()).err().unwrap();
-    assert!(error.message.contains("'p' in part"), "{}", error.message);
-    let mut plain = garment;
+fn what_cannot_be_simulated_is_refused() {
+    let text = patch(r#"{"preset": "jersey"}"#, 0.03, 0.03, WHOLE);
+    let mut plain = garment_from_json(&text, None).expect("garment");
     plain.fabrics[0].yarns = None;
     let error = Sim::new(&plain, &SimOptions::default()).err().unwrap();
     assert!(error.message.contains("no yarns"), "{}", error.message);
-    let sewn = patch(r#"{"preset": "jersey"}"#, 0.03, 0.03, WHOLE).replace(
-        r#""panels": ["#,
-        r#""seams": [{"a": ["p", 1], "b": ["q", 3]}], "panels": [{"name": "q", "fabric": "y",
-            "vertices": [[0, 0], [0.03, 0], [0.03, 0.03], [0, 0.03]],
-            "edges": [[0, 1], [1, 2], [2, 3], [3, 0]]}, "#,
-    );
-    let garment = garment_from_json(&sewn, None).expect("garment");
-    let error = Sim::new(&garment, &SimOptions::default()).err().unwrap();
-    assert!(
-        error.message.contains("sewn to panel 'q' of triangles"),
-        "{}",
-        error.message
-    );
     let mut sim = sim(&knit("garter", 4), 0.0, &[]);
     let count = sim.yarn_nodes().len() as u32;
     let error = sim.pin_yarn_nodes(&[count], None).err().unwrap();

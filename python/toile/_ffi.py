@@ -116,6 +116,8 @@ STRUCTS: dict[str, list[tuple[str, Any]]] = {
         ("bytes", c_uint64),
         ("factor_bytes", c_uint64),
         ("min_angle", c_double),
+        ("active_triangles", c_uint64),
+        ("carried_nodes", c_uint64),
     ],
     "toile_view_f64": [
         ("data", POINTER(c_double)),
@@ -214,6 +216,7 @@ FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
     "toile_sim_yarn_tensions": (c_int32, _copy_f64),
     "toile_sim_yarn_compressions": (c_int32, _copy_f64),
     "toile_sim_yarn_slips": (c_int32, _copy_f64),
+    "toile_sim_yarn_active": (c_int32, [handle, POINTER(c_uint8), c_size_t, _size]),
     "toile_sim_pin_yarn_nodes": (c_int32, [handle, _u32, c_size_t, _f64]),
     "toile_sim_unpin_yarn_nodes": (c_int32, [handle, _u32, c_size_t]),
     "toile_sim_body_positions": (c_int32, [handle, c_uint32, _f64, c_size_t, _size]),

@@ -70,6 +70,10 @@ class SystemInfo:
     factor_bytes: int
     #: Smallest triangle angle [rad].
     min_angle: float
+    #: Triangles that are simulated; yarns stand for the others.
+    active_triangles: int
+    #: Nodes of yarns that triangles carry.
+    carried_nodes: int
 
 
 def _fields(value: Any) -> dict[str, Any]:

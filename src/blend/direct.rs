@@ -57,14 +57,21 @@ impl Direct {
         materials: &[YarnMaterial],
     ) -> Result<Self> {
         let places = Places::new(mesh, &laid)?;
-        let mut inside: Vec<bool> = places.own(&laid).iter().map(|t| full[*t as usize]).collect();
+        let mut inside: Vec<bool> = places
+            .own(&laid)
+            .iter()
+            .map(|t| full[*t as usize])
+            .collect();
         for (node, k) in &places.across {
             inside[*node as usize] |= full[places.map.triangle[*k] as usize];
         }
         let list = places.riders(mesh, full, &laid);
         let cover = Cover::new(mesh, &laid, &inside, places.own(&laid), |y| {
             let fabric = laid.yarn_fabric[y] as usize;
-            (materials[fabric].density, garment.panels[laid.panel_of(y)].grain)
+            (
+                materials[fabric].density,
+                garment.panels[laid.panel_of(y)].grain,
+            )
         })?;
         let (share, masses) = cover.left(mesh, full);
         if inside.iter().all(|i| *i) && list.is_empty() {

@@ -308,6 +308,10 @@ pub struct toile_system_info {
     pub factor_bytes: u64,
     /// Smallest angle of a triangle [rad].
     pub min_angle: f64,
+    /// Triangles that are simulated; yarns stand for the others.
+    pub active_triangles: u64,
+    /// Nodes of yarns that triangles carry.
+    pub carried_nodes: u64,
 }
 
 /// Numbers that lie in the library's memory. Valid until the next call on the same handle whose
@@ -381,7 +385,7 @@ versioned! {
     }
     toile_system_info {
         vertices: 0, triangles: 0, yarn_nodes: 0, unknowns: 0, bytes: 0, factor_bytes: 0,
-        min_angle: 0.0,
+        min_angle: 0.0, active_triangles: 0, carried_nodes: 0,
     }
     toile_view_f64 { data: ptr::null(), count: 0, components: 0, stride: 0, epoch: 0 }
 }

@@ -122,6 +122,23 @@ pub unsafe extern "C" fn toile_sim_yarn_slips(
     })
 }
 
+/// 1 for each node that moves by itself, 0 for one that the triangles around a region of yarns carry,
+/// shape [node_count]; sizes as in toile_sim_positions.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_yarn_active(
+    sim: *const toile_sim,
+    out: *mut u8,
+    capacity: usize,
+    needed: *mut usize,
+) -> toile_status {
+    entry!({
+        read(sim, |sim| {
+            let active: Vec<u8> = sim.active_yarn_nodes().into_iter().map(u8::from).collect();
+            output::copy(&active, out, capacity, needed)
+        })
+    })
+}
+
 /// Holds nodes of yarns, as toile_sim_pin holds vertices; yarns do not slide where they are held.
 /// TOILE_E_ARGUMENT names a node that does not exist.
 #[unsafe(no_mangle)]

@@ -245,6 +245,13 @@ impl Sim {
         (0..count).map(|v| !follows(v)).collect()
     }
 
+    /// For each node of the yarns whether it moves by itself; triangles carry the others.
+    pub fn active_yarn_nodes(&self) -> Vec<bool> {
+        let nodes = self.mesh.uv.len() as u32..self.state.positions.len() as u32;
+        let rides = |n| self.yarns.as_ref().is_some_and(|part| part.riders.rides(n));
+        nodes.map(|n| !rides(n)).collect()
+    }
+
     /// Holds nodes of yarns as [`Sim::pin`] holds vertices; yarns do not slide where they are held.
     pub fn pin_yarn_nodes(&mut self, nodes: &[u32], targets: Option<&[[f64; 3]]>) -> Result<()> {
         let first = self.first_node(nodes)?;

@@ -127,8 +127,7 @@ impl YarnMesh {
             }
         }
         for wrap in &whole.wraps {
-            if let (Some(axis), Some(wings)) =
-                (moved(wrap.axis, ids), moved(wrap.wings, passages))
+            if let (Some(axis), Some(wings)) = (moved(wrap.axis, ids), moved(wrap.wings, passages))
                 && self.reaches(&[axis[0], axis[1], node(wings[0], self), node(wings[1], self)])
             {
                 let wrap = Wrap {

@@ -94,6 +94,11 @@ pub(crate) fn info(args: &SceneArgs) -> Done {
     }
     row("vertices", info.vertices.to_string());
     row("triangles", info.triangles.to_string());
+    if info.yarn_nodes > 0 {
+        row("active triangles", info.active_triangles.to_string());
+        row("yarn nodes", info.yarn_nodes.to_string());
+        row("carried nodes", info.carried_nodes.to_string());
+    }
     row("unknowns", info.unknowns.to_string());
     row(
         "smallest angle",
