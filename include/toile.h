@@ -658,6 +658,14 @@ typedef struct toile_system_info {
      * Smallest angle of a triangle [rad].
      */
     double min_angle;
+    /**
+     * Triangles that are simulated; yarns stand for the others.
+     */
+    uint64_t active_triangles;
+    /**
+     * Nodes of yarns that triangles carry.
+     */
+    uint64_t carried_nodes;
 } toile_system_info;
 
 /**
@@ -970,8 +978,8 @@ void toile_body_free(struct toile_body *body);
  * Triangulates a garment and makes it ready to move; its vertices stand where the panels are
  * placed. `desc` NULL takes the defaults. The garment may be changed or freed afterwards. Free the
  * simulation with toile_sim_free. TOILE_E_GEOMETRY and TOILE_E_LIMIT name the panel;
- * TOILE_E_UNSUPPORTED: a blend region covers a panel in part, or a panel of yarns is sewn to one of
- * triangles.
+ * TOILE_E_ARGUMENT: a blend region holds no triangle, or its fabric has no yarns;
+ * TOILE_E_UNSUPPORTED: a region that covers a panel in part has hybrid rings.
  */
 toile_status toile_sim_create(const struct toile_garment *garment,
                               const struct toile_sim_desc *desc,
@@ -1341,6 +1349,15 @@ toile_status toile_sim_yarn_slips(const struct toile_sim *sim,
                                   double *out,
                                   size_t capacity,
                                   size_t *needed);
+
+/**
+ * 1 for each node that moves by itself, 0 for one that the triangles around a region of yarns carry,
+ * shape [node_count]; sizes as in toile_sim_positions.
+ */
+toile_status toile_sim_yarn_active(const struct toile_sim *sim,
+                                   uint8_t *out,
+                                   size_t capacity,
+                                   size_t *needed);
 
 /**
  * Holds nodes of yarns, as toile_sim_pin holds vertices; yarns do not slide where they are held.

@@ -334,7 +334,11 @@ fn arrays_are_copied_out_in_two_calls_or_not_at_all() {
     ] {
         check(&sim, call, 0xdead_beef);
     }
-    for call in [toile_sim_vertex_active, toile_sim_save] {
+    for call in [
+        toile_sim_vertex_active,
+        toile_sim_yarn_active,
+        toile_sim_save,
+    ] {
         check(&sim, call, 0xcc_u8);
     }
     check(&sim, toile_sim_backend, 0x55 as c_char);

@@ -19,8 +19,8 @@ fn garment(edge: f64, reach: Option<f64>) -> String {
     let (pitch, radius, young) = (1e-3, 0.25e-3, 1e7);
     let area = PI * radius * radius;
     let stretch = young * area / pitch;
-    // rods of Young's modulus 1e5 Pa in bending
-    let rigidity = 1e5 * PI * f64::powi(radius, 4) / 4.0;
+    // rods of Young's modulus 3e6 Pa in bending: wrinkles some 16 mm long
+    let rigidity = 3e6 * PI * f64::powi(radius, 4) / 4.0;
     let region = reach.map_or(String::new(), |r| {
         format!(r#"{{"panel": "p", "polygon": [[-1, -1], [{r}, -1], [{r}, 1], [-1, 1]]}}"#)
     });
@@ -45,8 +45,9 @@ struct Pucker {
     z: Vec<f64>,
 }
 
-/// The cloth with its seam gathered by a tenth and its far rim pulled by half a percent, from a small wave.
-fn puckered(edge: f64, reach: Option<f64>, what: &str) -> Pucker {
+/// The cloth with its seam gathered by a tenth and its far rim pulled by half a percent, at rest, from so many half
+/// waves beside the seam.
+fn puckered(edge: f64, reach: Option<f64>, waves: f64, what: &str) -> Pucker {
     let garment = garment_from_json(&garment(edge, reach), None).expect("garment");
     let mut settings = Settings::default();
     settings.set("yarn.sliding", 0.0).expect("number");
@@ -67,8 +68,9 @@ fn puckered(edge: f64, reach: Option<f64>, what: &str) -> Pucker {
         .iter()
         .map(|p| {
             let [x, y, _] = place(*p);
-            let fade = (-p.x / 0.01).exp() * (p.x / 0.002).min(1.0);
-            [x, y, 5e-4 * fade * (4.0 * PI * p.y / SIDE).cos()]
+            let away = p.x / 5e-3;
+            let height = 1e-3 * away * (1.0 - away).exp();
+            [x, y, height * (waves * PI * p.y / SIDE).cos()]
         })
         .collect();
     sim.set_positions(&waved, None).expect("positions");
@@ -156,32 +158,37 @@ fn correlation(a: &[f64], b: &[f64]) -> f64 {
 
 /// Yarns to two fifths of the panel: the error of the deflection beside the seam is at most 0.35 of that of triangles
 /// alone, its correlation with the full one at least 0.95, and the wrinkles as high to 5 %.
+///
+/// Gathered cloth has many ways to rest. All three models start from the same waves, near those that the yarns
+/// prefer, of either symmetry; much shorter wrinkles are not compared, as they end in other equilibria.
 #[test]
 fn yarns_beside_a_gathered_seam_pucker_as_everywhere() {
     let edge = 5e-3;
-    let full = puckered(edge, Some(1.0), "yarns");
-    let triangles = puckered(edge, None, "triangles");
-    let mixed = puckered(edge, Some(0.0161), "mixed");
-    let near = |p: &Vec2| p.x < NEAR;
-    let row = |p: &Vec2| (p.x - 4.5e-3).abs() < 1e-6;
-    let error = |other: &Pucker| {
-        let (a, b) = (full.near(near), other.near(near));
-        let d: Vec<f64> = a.iter().zip(&b).map(|(a, b)| a - b).collect();
-        let (ra, rb) = (full.near(row), other.near(row));
-        (rms(&d), correlation(&ra, &rb), rms(&rb) / rms(&ra))
-    };
-    let [m, t] = [&mixed, &triangles].map(error);
-    println!(
-        "mixed: {:.4} mm, correlation {:.4}, height {:.4}; triangles: {:.4} mm, {:.4}, {:.4}; full {:.4} mm",
-        1e3 * m.0,
-        m.1,
-        m.2,
-        1e3 * t.0,
-        t.1,
-        t.2,
-        1e3 * rms(&full.near(row))
-    );
-    assert!(m.0 <= 0.35 * t.0, "{m:?} {t:?}");
-    assert!(m.1 >= 0.95, "{m:?}");
-    assert!((m.2 - 1.0).abs() <= 0.05, "{m:?}");
+    for waves in [4.0, 5.0] {
+        println!("{waves} half waves");
+        let full = puckered(edge, Some(1.0), waves, "yarns");
+        let triangles = puckered(edge, None, waves, "triangles");
+        let mixed = puckered(edge, Some(0.0161), waves, "mixed");
+        let near = |p: &Vec2| p.x < NEAR;
+        let row = |p: &Vec2| (p.x - 4.5e-3).abs() < 1e-6;
+        let error = |other: &Pucker| {
+            let (a, b) = (full.near(near), other.near(near));
+            let d: Vec<f64> = a.iter().zip(&b).map(|(a, b)| a - b).collect();
+            let (ra, rb) = (full.near(row), other.near(row));
+            (rms(&d), correlation(&ra, &rb), rms(&rb) / rms(&ra))
+        };
+        let [m, t] = [&mixed, &triangles].map(error);
+        for (what, e) in [("mixed", m), ("triangles", t)] {
+            println!(
+                "{what}: error {:.4} mm, correlation {:.4}, height {:.4} of {:.4} mm",
+                1e3 * e.0,
+                e.1,
+                e.2,
+                1e3 * rms(&full.near(row))
+            );
+        }
+        assert!(m.0 <= 0.35 * t.0, "{m:?} {t:?}");
+        assert!(m.1 >= 0.95, "{m:?}");
+        assert!((m.2 - 1.0).abs() <= 0.05, "{m:?}");
+    }
 }

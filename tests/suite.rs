@@ -88,6 +88,8 @@ mod real_garments;
 mod reference_bending;
 #[path = "reference_membrane.rs"]
 mod reference_membrane;
+#[path = "report.rs"]
+mod report;
 #[path = "rest.rs"]
 mod rest;
 #[path = "scene_motion.rs"]

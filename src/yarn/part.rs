@@ -18,8 +18,9 @@ impl YarnMesh {
         let mut pieces: Vec<(usize, std::ops::Range<usize>)> = Vec::new();
         for y in 0..self.yarn_count() {
             let end = self.starts[y + 1] as usize;
-            let mut from = self.starts[y] as usize;
-            for i in from..=end {
+            let start = self.starts[y] as usize;
+            let mut from = start;
+            for i in start..=end {
                 if i == end || !wanted[self.incidences[i].node as usize] {
                     if i - from > 1 {
                         pieces.push((y, from..i));

@@ -47,6 +47,14 @@ pub(crate) enum Command {
         #[arg(long, value_name = "SVG")]
         out: PathBuf,
     },
+    /// Drapes a scene with blend regions by several models and compares them: error against time.
+    Report {
+        #[command(flatten)]
+        scene: SceneArgs,
+        /// Folder for report.json, report.csv and report.html; made if it is not there.
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+    },
     /// Draws model files: front, side and back beside each other, y up.
     Picture {
         /// Garment (OBJ, metres); each connected piece gets its own colour.
