@@ -83,7 +83,10 @@ fn run_writes_a_complete_summary_models_pattern_and_picture() {
         "vertices",
         "triangles",
         "yarn_nodes",
+        "full_nodes",
         "hybrid_nodes",
+        "carried_nodes",
+        "active_triangles",
         "unknowns",
         "peak_memory_bytes",
         "steps",
@@ -465,4 +468,36 @@ fn yarns_are_laid_counted_and_drawn() {
     ]);
     assert_eq!(code(&output), 1);
     assert!(text(&output.stderr).contains("two radii"));
+}
+
+/// `report` leaves its three files, and lists what it could not compare.
+#[test]
+fn report_compares_models_and_leaves_its_files() {
+    let folder = Folder::new("report");
+    let square = json!([[0, 0], [0.02, 0], [0.02, 0.02], [0, 0.02]]);
+    let scene = json!({
+        "toile": 1,
+        "name": "swatch",
+        "garment": {
+            "toile_garment": 1,
+            "name": "g",
+            "edge_length": 0.005,
+            "panels": [{"name": "p", "fabric": "y", "vertices": square,
+                "edges": [[0, 1], [1, 2], [2, 3], [3, 0]]}],
+            "fabrics": [{"name": "y", "yarns": {"weave": "plain", "warp_pitch": 0.002, "radius": 0.0005}}],
+            "blend_regions": [{"panel": "p", "polygon": [[-1, -1], [1, -1], [1, 0.011], [-1, 0.011]]}],
+        },
+        "pins": [{"panel": "p", "edge": 2}],
+        "numbers": {"yarn.sliding": 0, "solver.drape.max_steps": 1},
+    });
+    let file = folder.write("scene.json", &scene.to_string());
+    let out = folder.0.join("out");
+    let done = toile(&["report", path(&file), "--out", path(&out)]);
+    assert_eq!(code(&done), 0, "{}", text(&done.stderr));
+    assert!(text(&done.stdout).contains("mixed, regions x 1"));
+    let report: Value =
+        serde_json::from_slice(&std::fs::read(out.join("report.json")).unwrap()).unwrap();
+    assert_eq!(report["models"].as_array().unwrap().len(), 7);
+    assert!(text(&std::fs::read(out.join("report.csv")).unwrap()).starts_with("name,kind"));
+    assert!(text(&std::fs::read(out.join("report.html")).unwrap()).contains("swatch"));
 }

@@ -34,12 +34,9 @@ pub(crate) fn report(args: &SceneArgs, dir: &Path) -> Done {
                 1e3 * d.error,
                 d.height,
                 d.correlation,
-                match (row.reference, row.front) {
-                    (true, _) => "reference",
-                    (_, true) => "front",
-                    _ => "",
-                }
+                if row.front { "front" } else { "" }
             ),
+            None if row.reference => writeln!(text, "reference"),
             None => writeln!(text, "{}", row.reason),
         };
     }
