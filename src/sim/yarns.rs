@@ -111,7 +111,8 @@ impl YarnPart {
         state.sliding = vec![false; mesh.incidences.len()];
         state.strands = loose(mesh, &state.u);
         state.yarn_normals = vec![Vec3::zeros(); mesh.uv.len()];
-        self.carry(state);
+        // vertices stay exactly where they are placed: a drape asks whether they do
+        self.riders.carry(&mut state.positions);
     }
 
     /// Lets riders ride and vertices follow.

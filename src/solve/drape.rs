@@ -403,11 +403,10 @@ impl Relaxed {
     }
 }
 
-/// The state of a coarse level: as placed, in the same world, held at the vertices nearest to the
-/// pins of the fine one.
+/// The state of a coarse level: as placed, like the fine one, in the same world, held at the
+/// vertices nearest to the pins of the fine one, which may be vertices or nodes.
 fn coarse_state(coarse: &Engine, fine: &Engine, state: &State) -> State {
     let mesh = &coarse.system.cloth.mesh;
-    let fine_mesh = &fine.system.cloth.mesh;
     let mut out = State {
         positions: mesh.placed.clone(),
         velocities: vec![Vec3::zeros(); mesh.placed.len()],
@@ -417,15 +416,15 @@ fn coarse_state(coarse: &Engine, fine: &Engine, state: &State) -> State {
         ..state.clone()
     };
     for pin in &state.pins {
-        let panel = fine_mesh.vertex_panel[pin.vertex as usize] as usize;
-        let uv = fine_mesh.uv[pin.vertex as usize];
+        let panel = fine.system.panel_of(pin.vertex) as usize;
+        let uv = fine.system.flat_place(pin.vertex);
         let nearest = (mesh.panel_starts[panel]..mesh.panel_starts[panel + 1]).min_by(|a, b| {
             let d = |v: &u32| (mesh.uv[*v as usize] - uv).norm_squared();
             d(a).total_cmp(&d(b))
         });
         if let Some(vertex) = nearest {
             // the vertex may stand a little beside the pin: it keeps that offset
-            let offset = mesh.placed[vertex as usize] - fine_mesh.placed[pin.vertex as usize];
+            let offset = mesh.placed[vertex as usize] - state.positions[pin.vertex as usize];
             let target = pin.target + offset;
             if let Err(i) = out.pins.binary_search_by_key(&vertex, |p| p.vertex) {
                 out.pins.insert(i, Pin { vertex, target });

@@ -21,7 +21,7 @@ use crate::blend::Riders;
 use crate::cloth::Cloth;
 use crate::error::Result;
 use crate::math::parallel::Workers;
-use crate::math::{Vec3, topology};
+use crate::math::{Vec2, Vec3, topology};
 use crate::yarn::Yarns;
 use std::sync::Arc;
 
@@ -218,6 +218,15 @@ impl System {
         match (&self.yarns, p.checked_sub(self.points.vertex_count)) {
             (Some(yarns), Some(node)) => yarns.mesh.node_panel[node],
             _ => self.cloth.mesh.vertex_panel[p],
+        }
+    }
+
+    /// Flat coordinates of a point in its panel [m].
+    pub fn flat_place(&self, point: u32) -> Vec2 {
+        let p = point as usize;
+        match (&self.yarns, p.checked_sub(self.points.vertex_count)) {
+            (Some(yarns), Some(node)) => yarns.mesh.uv[node],
+            _ => self.cloth.mesh.uv[p],
         }
     }
 
