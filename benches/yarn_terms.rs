@@ -205,6 +205,7 @@ fn main() {
         let spent = (cpu() - from) / f64::from(UPDATES);
         table.entry("compression").or_default()[column] = 1e6 * spent / nodes;
         let state = State {
+            topology: Default::default(),
             time: 0.0,
             velocities: vec![Vec3::zeros(); x.len()],
             positions: x.clone(),

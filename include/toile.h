@@ -661,6 +661,33 @@ typedef struct toile_system_info {
 } toile_system_info;
 
 /**
+ * What is not as the yarns were laid.
+ */
+typedef struct toile_yarn_changes {
+    /**
+     * sizeof(toile_yarn_changes), set by the caller.
+     */
+    size_t struct_size;
+    /**
+     * Grows whenever any of these numbers, or the arrays that count nodes and passages, change. 0 without
+     * yarns, 1 as laid.
+     */
+    uint64_t epoch;
+    /**
+     * Passages of yarns through nodes that are gone.
+     */
+    uint64_t passages_gone;
+    /**
+     * Nodes that came out of others where yarns parted.
+     */
+    uint64_t nodes_split;
+    /**
+     * Nodes that no yarn passes any more.
+     */
+    uint64_t nodes_left;
+} toile_yarn_changes;
+
+/**
  * Numbers that lie in the library's memory. Valid until the next call on the same handle whose
  * handle is not const; compare `epoch` with toile_sim_epoch to find out.
  */
@@ -764,6 +791,11 @@ toile_status toile_energies_init(struct toile_energies *out, size_t struct_size)
  * Fills system information of `struct_size` bytes with zeros and its own size.
  */
 toile_status toile_system_info_init(struct toile_system_info *out, size_t struct_size);
+
+/**
+ * Fills changes of yarns of `struct_size` bytes with zeros and its own size.
+ */
+toile_status toile_yarn_changes_init(struct toile_yarn_changes *out, size_t struct_size);
 
 /**
  * Fills a view of `struct_size` bytes with zeros and its own size.
@@ -1282,6 +1314,10 @@ toile_status toile_sim_backend(const struct toile_sim *sim,
 /**
  * World positions of the yarns' nodes [m], shape [node_count, 3]; sizes as in toile_sim_positions.
  * Empty in a garment of triangles alone.
+ *
+ * Nodes keep their numbers. Where yarns come out of contacts (toile_sim_yarn_changes tells) new nodes are counted
+ * on at the end, and nodes that no yarn passes any more stay where they were; the sizes of this and of the
+ * arrays below change then.
  */
 toile_status toile_sim_yarn_nodes(const struct toile_sim *sim,
                                   double *out,
@@ -1343,8 +1379,42 @@ toile_status toile_sim_yarn_slips(const struct toile_sim *sim,
                                   size_t *needed);
 
 /**
- * Holds nodes of yarns, as toile_sim_pin holds vertices; yarns do not slide where they are held.
- * TOILE_E_ARGUMENT names a node that does not exist.
+ * Force on each node of the yarns and of what acts on them [N], shape [node_count, 3]: on a node that is held
+ * what its holder bears. Inertia is no part of it. Sizes as in toile_sim_positions.
+ */
+toile_status toile_sim_yarn_forces(const struct toile_sim *sim,
+                                   double *out,
+                                   size_t capacity,
+                                   size_t *needed);
+
+/**
+ * What has changed since the yarns were laid: contacts that yarns came out of. `epoch` grows with every step, drape or
+ * restored state that changes it.
+ */
+toile_status toile_sim_yarn_changes(const struct toile_sim *sim,
+                                    struct toile_yarn_changes *out);
+
+/**
+ * Node of a panel's yarns that was laid nearest to a point of the panel, in flat coordinates [m].
+ * TOILE_E_ARGUMENT: the panel is not simulated as yarns.
+ */
+toile_status toile_sim_locate_yarn_node(const struct toile_sim *sim,
+                                        uint32_t panel,
+                                        const double uv[2],
+                                        uint32_t *out_node);
+
+/**
+ * Node at the first (0) or the last (1) end of a yarn. TOILE_E_ARGUMENT names a yarn that does not exist.
+ */
+toile_status toile_sim_yarn_end(const struct toile_sim *sim,
+                                uint32_t yarn,
+                                uint32_t end,
+                                uint32_t *out_node);
+
+/**
+ * Holds nodes of yarns, as toile_sim_pin holds vertices; yarns do not slide where they are held,
+ * and no contact comes off there. A yarn is held whole by all of its nodes. TOILE_E_ARGUMENT names a node that does
+ * not exist, or that no yarn passes any more.
  */
 toile_status toile_sim_pin_yarn_nodes(struct toile_sim *sim,
                                       const uint32_t *nodes,

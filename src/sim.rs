@@ -1,8 +1,9 @@
 //! The one Rust facade: a garment in a world, stepped, draped, edited, saved, restored.
 //!
 //! Here: making, saving and restoring a [`Sim`]. `run` lets time pass, `world` edits what is around
-//! the cloth, `read` tells what there is.
+//! the cloth, `pins` holds it, `read` tells what there is.
 
+mod pins;
 mod read;
 mod run;
 mod world;
@@ -21,8 +22,10 @@ use crate::system::snapshot::{self, Origin};
 use crate::system::state::State;
 pub use crate::system::term::ContactSettings;
 use crate::tri::GarmentMesh;
+use crate::yarn::Topology;
 pub use read::SystemInfo;
 use std::sync::{Mutex, MutexGuard, PoisonError};
+pub use yarns::YarnChanges;
 use yarns::YarnPart;
 
 /// What a simulation is created with besides the garment.
@@ -98,12 +101,13 @@ impl Sim {
         if let Some(part) = &yarns {
             cloth = part.rest_of(garment, &mesh)?;
         }
-        let laid = yarns.as_ref().map(|part| part.yarns.clone());
+        let laid = yarns.as_ref().map(|part| part.now.clone());
         let system = System::with_yarns(cloth, laid, &BuildOptions::from(&options.settings))?;
         let mut state = State {
             time: 0.0,
             positions: mesh.placed.clone(),
             velocities: vec![Vec3::zeros(); mesh.placed.len()],
+            topology: Topology::default(),
             u: Vec::new(),
             u_rates: Vec::new(),
             sliding: Vec::new(),
@@ -155,9 +159,10 @@ impl Sim {
     }
 
     /// Goes back to a state that this simulation was in.
-    pub fn roll_back(&mut self, state: State) {
+    pub fn roll_back(&mut self, state: State) -> Result<()> {
         self.state = state;
         self.epoch += 1;
+        self.take_yarns()
     }
 
     /// Restores saved bytes of the same garment, bodies and tunables (threads and the limit of
@@ -176,6 +181,10 @@ impl Sim {
             }
         }
         std::mem::swap(&mut self.state, &mut state);
+        if let Err(error) = self.take_yarns() {
+            self.state = state;
+            return Err(error.at("snapshot"));
+        }
         self.epoch += 1;
         Ok(())
     }

@@ -122,5 +122,7 @@ mod yarn_sims;
 mod yarn_terms_fd;
 #[path = "yarn_terms_symmetry.rs"]
 mod yarn_terms_symmetry;
+#[path = "yarn_topology.rs"]
+mod yarn_topology;
 #[path = "yarn_weave.rs"]
 mod yarn_weave;

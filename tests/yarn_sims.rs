@@ -5,7 +5,7 @@ use toile::pattern::import::garment_from_json;
 use toile::sim::{DrapeOptions, Outcome, Settings, Sim, SimOptions};
 
 /// A rectangle of a fabric of yarns, every yarn simulated.
-fn patch(yarns: &str, width: f64, height: f64, region: &str) -> String {
+pub(crate) fn patch(yarns: &str, width: f64, height: f64, region: &str) -> String {
     format!(
         r#"{{"toile_garment": 1, "name": "patch", "edge_length": {},
             "panels": [{{"name": "p", "fabric": "y",
@@ -17,9 +17,9 @@ fn patch(yarns: &str, width: f64, height: f64, region: &str) -> String {
     )
 }
 
-const WHOLE: &str = "[[-1, -1], [1, -1], [1, 1], [-1, 1]]";
+pub(crate) const WHOLE: &str = "[[-1, -1], [1, -1], [1, 1], [-1, 1]]";
 
-fn sim(text: &str, gravity: f64, numbers: &[(&str, f64)]) -> Sim {
+pub(crate) fn sim(text: &str, gravity: f64, numbers: &[(&str, f64)]) -> Sim {
     let garment = garment_from_json(text, None).expect("garment");
     let mut settings = Settings::default();
     for (name, value) in numbers {
@@ -33,7 +33,7 @@ fn sim(text: &str, gravity: f64, numbers: &[(&str, f64)]) -> Sim {
     Sim::new(&garment, &options).expect("sim")
 }
 
-fn knit(structure: &str, loops: usize) -> String {
+pub(crate) fn knit(structure: &str, loops: usize) -> String {
     let w = 0.003;
     let n = loops as f64;
     // the finished size of so many wales and courses

@@ -238,3 +238,41 @@ def test_yarns_of_a_panel_are_read_and_held():
             sim.unpin_yarn_nodes(held)
         with pytest.raises(ValueError):
             sim.pin_yarn_nodes(held, target[:1])
+
+
+def test_a_weft_is_pulled_out_of_a_weave():
+    size = 0.005
+    garment = {
+        "toile_garment": 1,
+        "name": "weave",
+        "edge_length": 0.002,
+        "panels": [
+            {
+                "name": "p",
+                "fabric": "y",
+                "vertices": [[0, 0], [size, 0], [size, size], [0, size]],
+                "edges": [[0, 1], [1, 2], [2, 3], [3, 0]],
+            }
+        ],
+        "fabrics": [
+            {"name": "y", "yarns": {"weave": "plain", "warp_pitch": 0.001, "radius": 0.00025}}
+        ],
+        "blend_regions": [{"panel": "p", "polygon": [[-1, -1], [1, -1], [1, 1], [-1, 1]]}],
+    }
+    with toile.Sim(toile.Garment.from_json(json.dumps(garment)), gravity=(0, 0, 0)) as sim:
+        sim["solver.newton.relative_tolerance"] = 1e-3
+        # five warp yarns, then five wefts
+        sim.pin_yarn_nodes([sim.yarn_end(yarn, end) for yarn in range(5) for end in (0, 1)])
+        node = sim.yarn_end(7, 1)
+        assert node == sim.locate_yarn_node(0, (size, 0.5 * size))
+        assert sim.yarn_changes == toile.YarnChanges(1, 0, 0, 0)
+        passages = len(sim.yarn_indices)
+        pulled = []
+        for _ in range(70):
+            sim.pin_yarn_nodes([node], sim.yarn_nodes[[node]] + [1e-4, 0, 0])
+            sim.step(1e-3)
+            pulled.append(np.linalg.norm(sim.yarn_forces[node]))
+        changes = sim.yarn_changes
+        assert changes.passages_gone == 5 and changes.epoch == 6
+        assert len(sim.yarn_indices) == len(sim.yarn_slips) == passages - 5
+        assert pulled[-1] < 0.2 * max(pulled)

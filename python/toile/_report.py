@@ -72,6 +72,20 @@ class SystemInfo:
     min_angle: float
 
 
+@dataclass(frozen=True)
+class YarnChanges:
+    """What is not as the yarns were laid: contacts that yarns came out of."""
+
+    #: Grows whenever the others, or the arrays of nodes and passages, change; 1 as laid.
+    epoch: int
+    #: Passages of yarns through nodes that are gone.
+    passages_gone: int
+    #: Nodes that came out of others where yarns parted.
+    nodes_split: int
+    #: Nodes that no yarn passes any more.
+    nodes_left: int
+
+
 def _fields(value: Any) -> dict[str, Any]:
     skip = ("struct_size", "reserved")
     return {name: getattr(value, name) for name, _ in value._fields_ if name not in skip}

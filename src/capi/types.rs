@@ -310,6 +310,23 @@ pub struct toile_system_info {
     pub min_angle: f64,
 }
 
+/// What is not as the yarns were laid.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct toile_yarn_changes {
+    /// sizeof(toile_yarn_changes), set by the caller.
+    pub struct_size: usize,
+    /// Grows whenever any of these numbers, or the arrays that count nodes and passages, change. 0 without
+    /// yarns, 1 as laid.
+    pub epoch: u64,
+    /// Passages of yarns through nodes that are gone.
+    pub passages_gone: u64,
+    /// Nodes that came out of others where yarns parted.
+    pub nodes_split: u64,
+    /// Nodes that no yarn passes any more.
+    pub nodes_left: u64,
+}
+
 /// Numbers that lie in the library's memory. Valid until the next call on the same handle whose
 /// handle is not const; compare `epoch` with toile_sim_epoch to find out.
 #[repr(C)]
@@ -383,6 +400,7 @@ versioned! {
         vertices: 0, triangles: 0, yarn_nodes: 0, unknowns: 0, bytes: 0, factor_bytes: 0,
         min_angle: 0.0,
     }
+    toile_yarn_changes { epoch: 0, passages_gone: 0, nodes_split: 0, nodes_left: 0 }
     toile_view_f64 { data: ptr::null(), count: 0, components: 0, stride: 0, epoch: 0 }
 }
 
@@ -471,6 +489,15 @@ pub unsafe extern "C" fn toile_energies_init(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn toile_system_info_init(
     out: *mut toile_system_info,
+    struct_size: usize,
+) -> toile_status {
+    entry!({ desc::init(out, struct_size) })
+}
+
+/// Fills changes of yarns of `struct_size` bytes with zeros and its own size.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_yarn_changes_init(
+    out: *mut toile_yarn_changes,
     struct_size: usize,
 ) -> toile_status {
     entry!({ desc::init(out, struct_size) })

@@ -63,7 +63,7 @@ impl Results {
     /// Force of the cloth on the holder of a pin [N].
     fn reaction(&mut self, model: &Model, sim: &Sim, pin: usize) -> Result<Vec3> {
         if self.forces.is_none() {
-            self.forces = Some(sim.forces()?);
+            self.forces = Some(sim.point_forces()?);
         }
         let forces = self.forces.as_deref().unwrap_or_default();
         let vertices = model.pins[pin].iter().filter(|v| sim.is_pinned(v.0));

@@ -60,21 +60,28 @@ pub struct SceneBody {
     pub motion: BodyMotion,
 }
 
-/// Which vertices a pin holds.
+/// Which points a pin holds: vertices, or nodes on a panel that is simulated as yarns.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PinPlace {
-    /// The vertex nearest to a flat point [m].
+    /// The point nearest to a flat point [m].
     Point([f64; 2]),
-    /// Every vertex on an edge of the panel, by edge number.
+    /// Every point on an edge of the panel, by edge number.
     Edge(u32),
+    /// Every node of a yarn, or one at its end: 0 where it begins, 1 where it ends.
+    Yarn {
+        /// The yarn.
+        yarn: u32,
+        /// Which end.
+        end: Option<u32>,
+    },
 }
 
 /// A pin of a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScenePin {
-    /// Panel index.
+    /// Panel index; of no meaning for a yarn.
     pub panel: u32,
-    /// Which vertices.
+    /// Which points.
     pub place: PinPlace,
     /// Where a single point is to be [m]; otherwise it is held where the panel is placed.
     pub target: Option<[f64; 3]>,

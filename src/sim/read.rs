@@ -130,7 +130,7 @@ impl Sim {
     /// vertex, pinned ones included. On a free vertex at rest it vanishes; on a held one it is what
     /// its holder bears, turned around.
     pub fn forces(&self) -> Result<Vec<Vec3>> {
-        let mut forces = self.engine().forces(&self.state)?;
+        let mut forces = self.point_forces()?;
         forces.truncate(self.mesh.uv.len());
         Ok(forces)
     }

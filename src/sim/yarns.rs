@@ -1,11 +1,11 @@
 //! Yarns of a simulation: where they are, what holds them, and the vertices that follow them.
 
-use super::{Sim, finite};
+use super::Sim;
 use crate::blend::Follow;
 use crate::blend::embed::carried;
 use crate::blend::region::yarn_panels;
 use crate::cloth::Cloth;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::math::Vec3;
 use crate::pattern::Garment;
 use crate::readout::yarns::{Curve, curves};
@@ -14,12 +14,17 @@ use crate::system::state::State;
 use crate::system::yarn::friction::loose;
 use crate::tri::GarmentMesh;
 use crate::yarn::layout::Layout;
-use crate::yarn::{Incidence, YarnMaterial, YarnMesh, Yarns, lay};
-use std::sync::Arc;
+use crate::yarn::{Incidence, Topology, YarnMaterial, YarnMesh, Yarns, lay};
+use std::sync::{Arc, PoisonError};
 
 /// Yarns and the vertices that they carry.
 pub(super) struct YarnPart {
-    pub(super) yarns: Arc<Yarns>,
+    /// Yarns as they pass their nodes now.
+    pub(super) now: Arc<Yarns>,
+    /// What is not as laid, in `now`.
+    topology: Topology,
+    /// Grows whenever `now` changes.
+    epoch: u64,
     /// Panels that are simulated as yarns.
     pub(super) panels: Vec<bool>,
     follow: Follow,
@@ -55,10 +60,9 @@ impl YarnPart {
         let reach = |panel: u32| garment.panel_edge_length(&garment.panels[panel as usize]);
         let follow = Follow::new(mesh, &laid, &panels, reach)?;
         Ok(Some(Self {
-            yarns: Arc::new(Yarns {
-                mesh: laid,
-                materials,
-            }),
+            now: Arc::new(Yarns::laid(laid, materials)),
+            topology: Topology::default(),
+            epoch: 1,
             panels,
             follow,
         }))
@@ -71,7 +75,7 @@ impl YarnPart {
 
     /// Adds the nodes, where the panels are placed, to a state of the vertices.
     pub(super) fn place(&self, garment: &Garment, state: &mut State) {
-        let mesh = &self.yarns.mesh;
+        let mesh = &self.now.mesh;
         for node in 0..mesh.uv.len() {
             let placement = &garment.panels[mesh.node_panel[node] as usize].placement;
             let (uv, lift) = (mesh.uv[node], mesh.lift[node]);
@@ -91,7 +95,7 @@ impl YarnPart {
 
     /// Lets the vertices follow.
     pub(super) fn carry(&self, state: &mut State) {
-        let first = state.positions.len() - self.yarns.mesh.uv.len();
+        let first = state.positions.len() - self.now.mesh.uv.len();
         for values in [&mut state.positions, &mut state.velocities] {
             let (vertices, nodes) = values.split_at_mut(first);
             self.follow.apply(nodes, vertices);
@@ -102,7 +106,7 @@ impl YarnPart {
     pub(super) fn take(&self, mesh: &GarmentMesh, state: &mut State) -> Result<()> {
         let first = mesh.uv.len();
         for values in [&mut state.positions, &mut state.velocities] {
-            let nodes = carried(mesh, &values[..first], &self.yarns.mesh)?;
+            let nodes = carried(mesh, &values[..first], &self.now.mesh)?;
             values.truncate(first);
             values.extend(nodes);
         }
@@ -115,10 +119,21 @@ impl YarnPart {
     }
 }
 
+/// What is not as laid.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct YarnChanges {
+    /// Laid passages of yarns through nodes that are gone.
+    pub passages_gone: usize,
+    /// Nodes that came out of others, counted on after the laid ones.
+    pub nodes_split: usize,
+    /// Nodes that no yarn passes any more.
+    pub nodes_left: usize,
+}
+
 impl Sim {
-    /// The yarns as laid, if there are any.
+    /// The yarns as they pass their nodes now, if there are any; coordinates are those of the layout.
     pub fn yarns(&self) -> Option<&YarnMesh> {
-        self.yarns.as_ref().map(|part| &part.yarns.mesh)
+        self.yarns.as_ref().map(|part| &part.now.mesh)
     }
 
     /// Positions of the yarns' nodes [m].
@@ -154,15 +169,9 @@ impl Sim {
         let Some(part) = &self.yarns else {
             return Vec::new();
         };
-        let radius = |y| part.yarns.material(y).radius;
+        let radius = |y| part.now.material(y).radius;
         let normals = self.yarn_normals();
-        curves(
-            &part.yarns.mesh,
-            self.yarn_nodes(),
-            &normals,
-            radius,
-            samples,
-        )
+        curves(&part.now.mesh, self.yarn_nodes(), &normals, radius, samples)
     }
 
     /// Tension between each incidence and the next of its yarn [N]; 0 at the last.
@@ -170,10 +179,10 @@ impl Sim {
         let Some(part) = &self.yarns else {
             return Vec::new();
         };
-        let (mesh, x) = (&part.yarns.mesh, self.yarn_nodes());
+        let (mesh, x) = (&part.now.mesh, self.yarn_nodes());
         let mut out = vec![0.0; mesh.incidences.len()];
         for y in 0..mesh.yarn_count() {
-            let stiffness = part.yarns.material(y).stretch;
+            let stiffness = part.now.material(y).stretch;
             for i in mesh.starts[y] as usize + 1..mesh.starts[y + 1] as usize {
                 let [a, b] = [i - 1, i].map(|i| x[mesh.incidences[i].node as usize]);
                 let du = self.state.u[i] - self.state.u[i - 1];
@@ -213,43 +222,40 @@ impl Sim {
         (0..count).map(|v| !follows(v)).collect()
     }
 
-    /// Holds nodes of yarns as [`Sim::pin`] holds vertices; yarns do not slide where they are held.
-    pub fn pin_yarn_nodes(&mut self, nodes: &[u32], targets: Option<&[[f64; 3]]>) -> Result<()> {
-        let first = self.first_node(nodes)?;
-        if let Some(targets) = targets {
-            if targets.len() != nodes.len() {
-                return Err(Error::argument(format!(
-                    "{} nodes but {} targets",
-                    nodes.len(),
-                    targets.len()
-                )));
-            }
-            for (n, t) in nodes.iter().zip(targets) {
-                finite(&format!("target of yarn node {n}"), t)?;
-            }
-        }
-        for (k, node) in nodes.iter().enumerate() {
-            self.hold(first + node, targets.map(|t| Vec3::from(t[k])));
-            if let Some(part) = &self.yarns {
-                for strand in part.yarns.mesh.stack(*node as usize) {
-                    self.state.sliding[strand.incidence as usize] = false;
-                    self.state.u_rates[strand.incidence as usize] = 0.0;
-                }
-            }
-        }
-        self.epoch += 1;
-        Ok(())
+    /// Grows whenever yarns have left contacts, or have come back to them with an earlier state: the numbers of
+    /// passages change then, and nodes come in. 0 without yarns.
+    pub fn yarn_epoch(&self) -> u64 {
+        self.yarns.as_ref().map_or(0, |part| part.epoch)
     }
 
-    /// Lets nodes of yarns go; one that is not held is refused.
-    pub fn unpin_yarn_nodes(&mut self, nodes: &[u32]) -> Result<()> {
-        let first = self.first_node(nodes)?;
-        if let Some(n) = nodes.iter().find(|n| !self.is_pinned(first + **n)) {
-            return Err(Error::argument(format!("yarn node {n} is not pinned")));
+    /// Numbers of what has changed since the yarns were laid.
+    pub fn yarn_changes(&self) -> YarnChanges {
+        let left = self.yarns().map_or(0, |mesh| {
+            (0..mesh.uv.len())
+                .filter(|n| mesh.stack(*n).is_empty())
+                .count()
+        });
+        YarnChanges {
+            passages_gone: self.state.topology.gone(),
+            nodes_split: self.state.topology.split.len(),
+            nodes_left: left,
         }
-        let held: Vec<u32> = nodes.iter().map(|n| first + n).collect();
-        self.state.pins.retain(|p| !held.contains(&p.vertex));
-        self.epoch += 1;
+    }
+
+    /// Takes the yarns of a state whose topology is another one.
+    pub(super) fn take_yarns(&mut self) -> Result<()> {
+        let Some(part) = &mut self.yarns else {
+            return Ok(());
+        };
+        if part.topology != self.state.topology {
+            let mut engine = self.engine.lock().unwrap_or_else(PoisonError::into_inner);
+            engine.take_contacts(&self.state)?;
+            if let Some(now) = &engine.system.yarns {
+                part.now = now.clone();
+            }
+            part.topology.clone_from(&self.state.topology);
+            part.epoch += 1;
+        }
         Ok(())
     }
 
@@ -257,17 +263,6 @@ impl Sim {
     pub(super) fn carry_vertices(&mut self) {
         if let Some(part) = &self.yarns {
             part.carry(&mut self.state);
-        }
-    }
-
-    /// Point number of node 0, all `nodes` being there.
-    fn first_node(&self, nodes: &[u32]) -> Result<u32> {
-        let count = self.yarn_nodes().len();
-        match nodes.iter().find(|&&n| n as usize >= count) {
-            Some(n) => Err(Error::argument(format!(
-                "yarn node {n} does not exist: the simulation has {count}"
-            ))),
-            None => Ok(self.mesh.uv.len() as u32),
         }
     }
 }

@@ -127,6 +127,15 @@ impl Engine {
         Ok(())
     }
 
+    /// Takes the contacts that a state's yarns are in and where they slide.
+    pub fn take_contacts(&mut self, state: &State) -> Result<()> {
+        if self.system.take_contacts(state)? {
+            self.assembler
+                .rebuild(self.system.block_count(), &self.system.terms);
+        }
+        Ok(())
+    }
+
     /// Starts a call of the host: results depend on the state alone, not on what was solved before.
     pub fn begin(&mut self) {
         self.linear.forget();
@@ -172,10 +181,7 @@ impl Engine {
         fraction: f64,
         motion: Motion,
     ) -> Result<Attempt> {
-        if self.system.set_sliding(&state.sliding)? {
-            self.assembler
-                .rebuild(self.system.block_count(), &self.system.terms);
-        }
+        self.take_contacts(state)?;
         let dynamic = motion == Motion::Dynamic;
         let rest = matches!(motion, Motion::Rest { .. });
         let inv_dt = if dynamic { 1.0 / h } else { 0.0 };
@@ -349,7 +355,10 @@ impl Engine {
         }
         system.unpack(&self.start, &x, h, state);
         if !matches!(motion, Motion::Relax { follow: false, .. }) {
-            system.follow_contacts(state, &self.workers);
+            // the forces of a relaxation are not those of a motion: yarns come out of contacts in time only
+            if system.follow_contacts(dynamic, state, &self.workers)? {
+                self.assembler.rebuild(system.block_count(), &system.terms);
+            }
         }
         system.bodies.accept(state);
         Ok(Attempt::Accepted(summary))

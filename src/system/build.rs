@@ -21,15 +21,17 @@ use crate::cloth::Cloth;
 use crate::error::Result;
 use crate::math::parallel::Workers;
 use crate::math::{Vec3, topology};
-use crate::yarn::Yarns;
+use crate::yarn::{Topology, Yarns};
 use std::sync::Arc;
 
 /// A compiled garment.
 pub struct System {
     /// Rest data of the triangle part.
     pub cloth: Cloth,
-    /// Rest data of the yarns, if there are any.
+    /// Rest data of the yarns as they are now, if there are any.
     pub yarns: Option<Arc<Yarns>>,
+    laid: Option<Arc<Yarns>>,
+    topology: Topology,
     /// Vertices and nodes.
     pub points: Points,
     /// Blocks of the yarns' unknowns, after those of the vertices.
@@ -86,7 +88,7 @@ impl System {
         Self::with_yarns(cloth, None, options)
     }
 
-    /// Compiles a garment whose yarns are simulated where the cloth has no triangles.
+    /// Compiles a garment whose yarns, as laid, are simulated where the cloth has no triangles.
     pub fn with_yarns(
         cloth: Cloth,
         yarns: Option<Arc<Yarns>>,
@@ -98,7 +100,7 @@ impl System {
         let yarn_options = YarnOptions::from(options);
         let contacts = yarns
             .clone()
-            .map(|y| Contacts::new(y, &yarn_options))
+            .map(|y| Contacts::new(y.clone(), y, &yarn_options))
             .transpose()?;
         let terms = terms(&cloth, &points, yarns.as_deref(), &unknowns, options)?;
         let edges = topology::edges(&cloth.mesh.triangles);
@@ -108,7 +110,9 @@ impl System {
             .collect();
         Ok(Self {
             cloth,
+            laid: yarns.clone(),
             yarns,
+            topology: Topology::default(),
             points,
             unknowns,
             sliding,
@@ -141,14 +145,18 @@ impl System {
         self.points.count() + self.unknowns.slide_blocks()
     }
 
-    /// Takes which yarns slide where; true if unknowns have come or gone.
-    pub fn set_sliding(&mut self, sliding: &[bool]) -> Result<bool> {
-        if *sliding == *self.sliding {
-            return Ok(false);
+    /// Takes the contacts that a state's yarns are in and where they slide; true if unknowns have come or gone.
+    pub fn take_contacts(&mut self, state: &State) -> Result<bool> {
+        match &self.laid {
+            Some(laid) if state.topology != self.topology => {
+                let now = laid.present(&state.topology)?;
+                self.set_yarns(laid.clone(), now, &state.topology)?;
+            }
+            _ if *state.sliding == *self.sliding => return Ok(false),
+            _ => {}
         }
-        self.unknowns = unknowns(&self.cloth, self.yarns.as_deref(), sliding)?;
-        self.sliding.clear();
-        self.sliding.extend_from_slice(sliding);
+        self.unknowns = unknowns(&self.cloth, self.yarns.as_deref(), &state.sliding)?;
+        self.sliding.clone_from(&state.sliding);
         self.terms = terms(
             &self.cloth,
             &self.points,
@@ -159,11 +167,33 @@ impl System {
         Ok(true)
     }
 
-    /// After an accepted step: the normal forces of the yarns' contacts, and what slides next.
-    pub fn follow_contacts(&mut self, state: &mut State, workers: &Workers) {
-        if let Some(contacts) = &mut self.contacts {
-            contacts.follow(self.options.sliding, state, workers);
-        }
+    fn set_yarns(&mut self, laid: Arc<Yarns>, now: Yarns, topology: &Topology) -> Result<()> {
+        let now = Arc::new(now);
+        let options = YarnOptions::from(&self.options);
+        self.contacts = Some(Contacts::new(laid, now.clone(), &options)?);
+        self.points = Points::new(&self.cloth, Some(&now));
+        self.yarns = Some(now);
+        self.topology.clone_from(topology);
+        self.sliding.clear();
+        Ok(())
+    }
+
+    /// After an accepted step: the normal forces of the yarns' contacts, what slides next, and, if it was one in time
+    /// (`releases`), which contacts have come off; true if some have and unknowns have come or gone.
+    pub fn follow_contacts(
+        &mut self,
+        releases: bool,
+        state: &mut State,
+        workers: &Workers,
+    ) -> Result<bool> {
+        let (Some(contacts), Some(laid)) = (&mut self.contacts, &self.laid) else {
+            return Ok(false);
+        };
+        let Some(now) = contacts.follow(self.options.sliding, releases, state, workers)? else {
+            return Ok(false);
+        };
+        self.set_yarns(laid.clone(), now, &state.topology)?;
+        self.take_contacts(state)
     }
 
     /// Values of all blocks in a state.
@@ -321,12 +351,14 @@ impl System {
             .fold(sewn, f64::max)
     }
 
-    /// Smallest signed distance of a vertex to a body [m], infinite without bodies.
+    /// Smallest signed distance of a point to a body [m], infinite without bodies. Nodes that no yarn passes
+    /// do not count.
     pub fn smallest_gap(&self, x: &[Vec3]) -> f64 {
         let mut gap = f64::INFINITY;
+        let passed = |i: &usize| *i < self.points.vertex_count || self.points.moves(*i);
         for b in 0..self.bodies.count() {
-            for p in x {
-                gap = gap.min(self.bodies.value(b, p));
+            for i in (0..x.len()).filter(passed) {
+                gap = gap.min(self.bodies.value(b, &x[i]));
             }
         }
         gap
@@ -388,7 +420,10 @@ fn terms(
         )));
     }
     terms.push(Box::new(Pressure::new(cloth)));
-    if let Some(Yarns { mesh, materials }) = yarns {
+    if let Some(Yarns {
+        mesh, materials, ..
+    }) = yarns
+    {
         terms.extend(yarn::terms(mesh, materials, unknowns, &options.into())?);
     }
     if options.self_contact {

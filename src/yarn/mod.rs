@@ -15,10 +15,12 @@ mod piece;
 mod region;
 mod rods;
 mod stitch;
+pub mod topology;
 mod weave;
 
 pub use layout::{Cell, Layout, lay};
 pub use material::YarnMaterial;
+pub use topology::Topology;
 
 use crate::math::Vec2;
 
@@ -63,6 +65,8 @@ pub struct Yarns {
     pub mesh: YarnMesh,
     /// One for each fabric of the garment.
     pub materials: Vec<YarnMaterial>,
+    /// Each passage's number among the laid ones.
+    pub passages: Vec<u32>,
 }
 
 impl Yarns {

@@ -8,6 +8,7 @@ use super::friction::Rubbing;
 use super::gravity::Weight;
 use super::inertia::Inertia;
 use super::kernel::{MAX_POSITIONS, MAX_SLIDES};
+use super::passing::{Passing, passings};
 use super::shear::{Shear, lock};
 use super::spacing::Spacing;
 use super::stitch::StitchLength;
@@ -18,8 +19,8 @@ use super::{YarnOptions, material_of};
 use crate::error::{Error, Result};
 use crate::yarn::{YarnMaterial, YarnMesh};
 
-/// Length of a segment that nothing else keeps apart, over its laid length, below which its ends
-/// press on each other.
+/// Length of a segment between contacts that hold each other and that nothing else keeps apart, over its laid
+/// length, below which they press on each other.
 const CLOSEST: f64 = 0.4;
 
 /// How a strand rubs on its neighbours in the stack.
@@ -180,7 +181,12 @@ pub(super) fn spacings(
     let yarns = yarns(mesh);
     let mut out = Vec::with_capacity(mesh.incidences.len());
     let mut spaced = vec![false; mesh.incidences.len()];
+    let passings = passings(mesh);
     for spacing in &mesh.spacings {
+        // a loop can be pulled out
+        if passings[spacing.incidences[0] as usize] != Passing::Kept {
+            continue;
+        }
         spaced[spacing.incidences[0] as usize] = true;
         let m = material_of(
             mesh,
@@ -194,12 +200,12 @@ pub(super) fn spacings(
         };
         out.push(stencil(&[], &spacing.incidences, kernel));
     }
-    // a contact may come near to the next one or to the end of its yarn, and not pass it
+    // a contact may come near to one that it holds, and not pass it
     for y in 0..mesh.yarn_count() {
         let m = material_of(mesh, materials, y)?;
         for i in mesh.starts[y] as usize + 1..mesh.starts[y + 1] as usize {
             let laid = mesh.incidences[i].u - mesh.incidences[i - 1].u;
-            if !spaced[i - 1] {
+            if !spaced[i - 1] && passings[i - 1] == Passing::Kept {
                 let kernel = Spacing {
                     stiffness: m.spacing * laid,
                     least: CLOSEST * laid,
