@@ -181,8 +181,9 @@ impl Sim {
             }
         }
         std::mem::swap(&mut self.state, &mut state);
-        if let Err(error) = self.take_yarns() {
+        if let Err(error) = self.take_yarns().and_then(|()| self.check_coordinates()) {
             self.state = state;
+            self.take_yarns()?;
             return Err(error.at("snapshot"));
         }
         self.epoch += 1;

@@ -116,6 +116,8 @@ mod yarn_garments;
 mod yarn_knit;
 #[path = "yarn_laws.rs"]
 mod yarn_laws;
+#[path = "yarn_robust.rs"]
+mod yarn_robust;
 #[path = "yarn_sims.rs"]
 mod yarn_sims;
 #[path = "yarn_terms_fd.rs"]

@@ -167,6 +167,64 @@ fn pulling_the_yarn_of_garter_unravels_one_row() {
     assert!(most < 1.5e-3, "{most}");
 }
 
+/// Garter cut at both sides, held above and below: a course in the middle, pulled at its end, slides out of all its
+/// contacts, and no other contact lets go. The cloth is two pieces then.
+#[test]
+fn a_course_that_is_pulled_out_of_garter_leaves_the_rest_intact() {
+    // smoother than yarns are: over the turns of a row friction grows exponentially
+    let yarns = r#"{"preset": "jersey", "knit": "garter", "friction": 0.05}"#;
+    let (width, height) = (0.0132, 0.012_015);
+    let whole = patch(yarns, width, height, WHOLE);
+    let slanted = whole.replace(
+        &format!("[{width}, {height}], [0, {height}]"),
+        &format!("[0.0117, {height}], [0.0015, {height}]"),
+    );
+    assert_ne!(whole, slanted);
+    let mut sim = sim(&slanted, 0.0, &[ROUGH]);
+    let laid = sim.yarns().unwrap().clone();
+    let (low, high) =
+        (laid.uv.iter()).fold((f64::MAX, f64::MIN), |(a, b), p| (a.min(p.y), b.max(p.y)));
+    let held: Vec<u32> = (0..)
+        .zip(&laid.uv)
+        .filter(|(_, p)| p.y < low + 1.2e-3 || p.y > high - 1.2e-3)
+        .map(|p| p.0)
+        .collect();
+    sim.pin_yarn_nodes(&held, None).unwrap();
+    let course = laid.yarn_count() / 2;
+    let before = length(&laid, sim.yarn_coordinates());
+    let end = sim.yarn_end(course as u32, 1).unwrap();
+    let right = laid.uv[end as usize].x > 0.5 * width;
+    let way = Vec3::x() * if right { 3e-4 } else { -3e-4 };
+    let mut force = Vec::new();
+    for _ in 0..170 {
+        pull(&mut sim, end, way);
+        order(&sim);
+        force.push(sim.yarn_forces().unwrap()[end as usize].norm());
+        if sim.yarns().unwrap().yarn(course).len() == 2 {
+            break;
+        }
+    }
+    let contacts = laid.yarn(course).len() - 2;
+    let most = force.iter().fold(0.0_f64, |m, f| m.max(*f));
+    println!(
+        "{contacts} contacts left after {} ms, largest pull {most:.3} N, the last one {:.4} N",
+        force.len(),
+        force[force.len() - 1]
+    );
+    let told = YarnChanges {
+        passages_gone: contacts,
+        nodes_split: 0,
+        nodes_left: 0,
+    };
+    assert_eq!(sim.yarn_changes(), told);
+    let own: Vec<u32> = laid.yarn(course).iter().map(|i| i.node).collect();
+    let gone = left(&laid, &sim);
+    assert_eq!(gone.len(), contacts);
+    assert!(gone.iter().all(|n| own.contains(&(*n as u32))), "{gone:?}");
+    assert_eq!(length(sim.yarns().unwrap(), sim.yarn_coordinates()), before);
+    assert!(force[force.len() - 1] < 0.5 * most, "{force:?}");
+}
+
 /// Yarns as laid with a state that a contact is about to come off in, moving at random.
 struct Ready {
     yarns: Arc<Yarns>,
@@ -431,6 +489,7 @@ fn scenes_hold_yarns_by_place_and_by_number() {
         (r#"{"yarn": 99}"#, "yarn 99 does not exist"),
         (r#"{"yarn": 3, "end": "middle"}"#, "first"),
         (r#"{"yarn": 3, "panel": "p"}"#, "number alone"),
+        (r#"{"panel": "p", "edge": 0, "end": "last"}"#, "with yarn"),
         (r#"{"yarn": 3, "target": [0, 0, 0]}"#, "no single target"),
     ] {
         let error = sim_scene::sim_from_json(&scene(pins), None).err().unwrap();

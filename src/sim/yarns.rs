@@ -5,7 +5,7 @@ use crate::blend::Follow;
 use crate::blend::embed::carried;
 use crate::blend::region::yarn_panels;
 use crate::cloth::Cloth;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::math::Vec3;
 use crate::pattern::Garment;
 use crate::readout::yarns::{Curve, curves};
@@ -255,6 +255,23 @@ impl Sim {
             }
             part.topology.clone_from(&self.state.topology);
             part.epoch += 1;
+        }
+        Ok(())
+    }
+
+    /// Refuses coordinates that do not grow along every yarn.
+    pub(super) fn check_coordinates(&self) -> Result<()> {
+        let u = &self.state.u;
+        let starts = self.yarns().map_or(&[][..], |mesh| &mesh.starts);
+        for (y, range) in starts.windows(2).enumerate() {
+            let yarn = &u[range[0] as usize..range[1] as usize];
+            if let Some(i) = yarn.windows(2).position(|w| !(w[1] > w[0])) {
+                return Err(Error::parse(format!(
+                    "yarn {y}: u goes from {} to {} m after passage {i}",
+                    yarn[i],
+                    yarn[i + 1]
+                )));
+            }
         }
         Ok(())
     }

@@ -89,7 +89,10 @@ pub(super) fn pin(node: &Node<'_>, garment: Option<&Garment>) -> Result<ScenePin
     object.only(schema::PIN)?;
     let (panel, place) = match object.get("yarn") {
         Some(yarn) => (0, self::yarn(&object, &yarn)?),
-        None => place(&object, garment)?,
+        None => match object.get("end") {
+            Some(end) => return Err(end.error("goes with yarn alone")),
+            None => place(&object, garment)?,
+        },
     };
     let several = matches!(place, PinPlace::Edge(_) | PinPlace::Yarn { end: None, .. });
     let target = match object.get("target") {

@@ -4,6 +4,8 @@
 //! of the second, or where their partners are two yarns: there the yarns' thickness keeps them apart. Elsewhere nothing
 //! but friction does: an end slips through its last contact, a contact slides over a node of one yarn, and a loop
 //! that lies on one side of the yarn through it at both of two neighbouring contacts is pulled out (Cirio et al. 2017, section 5).
+//! Loops come out from the end of a yarn on, one after the other, as a row that is bound off does: the others
+//! are held by those between them and the end.
 
 use crate::yarn::{Family, Strand, YarnMesh};
 
@@ -16,7 +18,7 @@ pub enum Passing {
     End(u8),
     /// A node of one yarn and a contact; the node is the first passage (0) or the second (1).
     Lone(u8),
-    /// Two contacts with the same neighbouring yarn on the same side of it.
+    /// Two contacts with the same stretch of the same yarn on the same side of it, the last ones before a free end.
     Loop,
 }
 
@@ -139,6 +141,27 @@ impl<'a> Passages<'a> {
             && self.partners(i, group).all(neighbours)
     }
 
+    /// Whether no more than one contact lies between two contacts of a yarn and one of its ends.
+    fn is_last(&self, i: usize, j: usize) -> bool {
+        [(i.min(j), -1), (i.max(j), 1)]
+            .into_iter()
+            .any(|(from, step)| {
+                let outer = self.next(from, step, true);
+                outer.and_then(|o| self.next(o, step, true)).is_none()
+            })
+    }
+
+    /// Whether a loop is the last one of its yarn, or of a yarn that it lies on.
+    fn is_loose(&self, i: usize, j: usize) -> bool {
+        let partners = |k: usize| self.crossed(k);
+        let (before, after) = (partners(i), partners(j));
+        self.is_last(i, j)
+            || before
+                .iter()
+                .flat_map(|p| after.iter().map(move |q| (*p, *q)))
+                .any(|(p, q)| self.yarn(p) == self.yarn(q) && self.is_last(p, q))
+    }
+
     /// What the segment from passage `i` to `j`, the next one along the yarn, is between.
     pub fn passing(&self, i: usize, j: usize) -> Passing {
         let y = self.yarn(i);
@@ -159,7 +182,7 @@ impl<'a> Passages<'a> {
                 };
             }
         }
-        if self.is_loop(i, j) {
+        if self.is_loop(i, j) && self.is_loose(i, j) {
             Passing::Loop
         } else {
             Passing::Kept

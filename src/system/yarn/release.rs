@@ -4,12 +4,12 @@
 //!
 //! * An end takes its last contact off: that passage is gone, the end stays, laid straight on from the passage before.
 //! * A contact passes a node of one yarn (at a fifth of the radius): that passage is gone.
-//! * A loop comes out: its two nodes become one for each yarn, at the same places. What lay behind or before the same
+//! * The last loop before an end comes out: its two nodes become one for each yarn, at the same places. What lay behind or before the same
 //!   stretch of yarn at the contacts on both sides of it is then no longer held either, and comes apart likewise.
 //!
 //! An end and a loop come off only if the yarn that goes on from there is under a tension above `k_b/(8 R^2)`: the
 //! bending energy per length of a yarn that lies around another one, which has to be bent straight to come out.
-//! Cloth does not fray by its own weight.
+//! Cloth does not fray by its own weight. Where inertia has carried them to a fifth of the radius they come off at once.
 //!
 //! Where several yarns of one group are left at a node, each gets its own. Material coordinates of ends and of nodes
 //! of one yarn are constants from then on, so that lengths and masses stay what they are. Momentum:
@@ -24,7 +24,7 @@ use crate::yarn::{Topology, YarnMesh, Yarns};
 
 /// Length of a segment, over the radius and over its laid length, that no contact lasts below.
 const SHORT: f64 = 0.5;
-/// The same where a contact passes a node of one yarn.
+/// The same that no grip keeps, and where a contact passes a node of one yarn.
 const PASSED: f64 = 0.2;
 
 /// What comes off.
@@ -58,13 +58,13 @@ pub(super) fn nearness(yarns: &Yarns, i: usize, passing: Passing, state: &State)
     let laid = mesh.incidences[i + 1].u - mesh.incidences[i].u;
     let yarn = mesh.starts.partition_point(|&s| s as usize <= i) - 1;
     let material = yarns.material(yarn);
-    let part = if matches!(passing, Passing::Lone(_)) {
-        PASSED
-    } else {
-        SHORT
-    };
-    if state.u[i + 1] - state.u[i] >= part * material.radius.min(laid) {
+    let length = (state.u[i + 1] - state.u[i]) / material.radius.min(laid);
+    let lone = matches!(passing, Passing::Lone(_));
+    if length >= if lone { PASSED } else { SHORT } {
         return Nearness::Apart;
+    }
+    if length < PASSED && passing != Passing::Kept {
+        return Nearness::Pulled;
     }
     let grip = material.bending / (8.0 * material.radius * material.radius);
     let range = mesh.starts[yarn] as usize..mesh.starts[yarn + 1] as usize;
@@ -77,8 +77,7 @@ pub(super) fn nearness(yarns: &Yarns, i: usize, passing: Passing, state: &State)
     let before = || i > range.start && pulls(i - 1, i);
     let after = || i + 2 < range.end && pulls(i + 1, i + 2);
     let pulled = match passing {
-        Passing::Kept => false,
-        Passing::Lone(_) => true,
+        Passing::Kept | Passing::Lone(_) => false,
         Passing::End(0) => after(),
         Passing::End(_) => before(),
         Passing::Loop => before() || after(),
