@@ -2,6 +2,8 @@
 
 import json
 import os
+import subprocess
+import sys
 import threading
 from pathlib import Path
 
@@ -10,6 +12,7 @@ import pytest
 
 import toile
 from square import SQUARE, square
+from weave import pull, weave
 
 def test_arrays_have_the_shapes_and_values_that_were_asked_for():
     with toile.Sim(square()) as sim:
@@ -241,38 +244,25 @@ def test_yarns_of_a_panel_are_read_and_held():
 
 
 def test_a_weft_is_pulled_out_of_a_weave():
-    size = 0.005
-    garment = {
-        "toile_garment": 1,
-        "name": "weave",
-        "edge_length": 0.002,
-        "panels": [
-            {
-                "name": "p",
-                "fabric": "y",
-                "vertices": [[0, 0], [size, 0], [size, size], [0, size]],
-                "edges": [[0, 1], [1, 2], [2, 3], [3, 0]],
-            }
-        ],
-        "fabrics": [
-            {"name": "y", "yarns": {"weave": "plain", "warp_pitch": 0.001, "radius": 0.00025}}
-        ],
-        "blend_regions": [{"panel": "p", "polygon": [[-1, -1], [1, -1], [1, 1], [-1, 1]]}],
-    }
-    with toile.Sim(toile.Garment.from_json(json.dumps(garment)), gravity=(0, 0, 0)) as sim:
-        sim["solver.newton.relative_tolerance"] = 1e-3
-        # five warp yarns, then five wefts
-        sim.pin_yarn_nodes([sim.yarn_end(yarn, end) for yarn in range(5) for end in (0, 1)])
-        node = sim.yarn_end(7, 1)
-        assert node == sim.locate_yarn_node(0, (size, 0.5 * size))
+    with weave() as sim:
+        assert sim.yarn_end(7, 1) == sim.locate_yarn_node(0, (0.005, 0.0025))
         assert sim.yarn_changes == toile.YarnChanges(1, 0, 0, 0)
         passages = len(sim.yarn_indices)
-        pulled = []
-        for _ in range(70):
-            sim.pin_yarn_nodes([node], sim.yarn_nodes[[node]] + [1e-4, 0, 0])
-            sim.step(1e-3)
-            pulled.append(np.linalg.norm(sim.yarn_forces[node]))
+        pulled = pull(sim, 70)
         changes = sim.yarn_changes
         assert changes.passages_gone == 5 and changes.epoch == 6
         assert len(sim.yarn_indices) == len(sim.yarn_slips) == passages - 5
         assert pulled[-1] < 0.2 * max(pulled)
+
+
+def test_a_half_pulled_weft_goes_on_bit_by_bit_in_another_process(tmp_path):
+    with weave() as sim:
+        pull(sim, 30)
+        assert 0 < sim.yarn_changes.passages_gone < 5
+        half = tmp_path / "half"
+        half.write_bytes(sim.save())
+        pull(sim, 20)
+        whole = sim.save()
+    program = Path(__file__).with_name("weave.py")
+    subprocess.run([sys.executable, program, half, "20"], check=True)
+    assert half.read_bytes() == whole

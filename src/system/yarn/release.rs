@@ -100,6 +100,18 @@ pub(super) fn release(
     state: &mut State,
 ) -> Result<Option<Yarns>> {
     let mesh = &yarns.mesh;
+    let comes_off = |(i, passing): (usize, &Passing)| {
+        *passing != Passing::Kept
+            && (state.sliding[i] || state.sliding[i + 1])
+            && nearness(yarns, i, *passing, state) == Nearness::Pulled
+    };
+    let near: Vec<usize> = (passings.iter().enumerate())
+        .filter(|p| comes_off(*p))
+        .map(|(i, _)| i)
+        .collect();
+    if near.is_empty() {
+        return Ok(None);
+    }
     let mut change = Change {
         yarns,
         passages: Passages::new(mesh),
@@ -108,13 +120,8 @@ pub(super) fn release(
         touched: Vec::new(),
         slipped: Vec::new(),
     };
-    for (i, passing) in passings.iter().enumerate() {
-        if *passing != Passing::Kept
-            && (state.sliding[i] || state.sliding[i + 1])
-            && nearness(yarns, i, *passing, state) == Nearness::Pulled
-        {
-            change.take(i, held);
-        }
+    for i in near {
+        change.take(i, held);
     }
     if change.touched.is_empty() {
         return Ok(None);
