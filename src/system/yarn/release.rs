@@ -1,20 +1,23 @@
 //! Contacts that yarns leave: after an accepted step the topology in the State follows.
 //!
-//! Where a segment has become shorter than half a yarn's radius (half its laid length if that is less) and yarns slide there:
+//! Where a segment has become shorter than half a yarn's radius (half its laid length if that is less) and yarns
+//! slide there:
 //!
 //! * An end takes its last contact off: that passage is gone, the end stays, laid straight on from the passage before.
 //! * A contact passes a node of one yarn (at a fifth of the radius): that passage is gone.
-//! * The last loop before an end comes out: its two nodes become one for each yarn, at the same places. What lay behind or before the same
-//!   stretch of yarn at the contacts on both sides of it is then no longer held either, and comes apart likewise.
+//! * The last loop before an end comes out: its two nodes become one for each yarn, at the same places. What lay
+//!   behind or before the same stretch of yarn at the contacts on both sides of it is then no longer held either, and
+//!   comes apart likewise.
 //!
 //! An end and a loop come off only if the yarn that goes on from there is under a tension above `k_b/(8 R^2)`: the
 //! bending energy per length of a yarn that lies around another one, which has to be bent straight to come out.
-//! Cloth does not fray by its own weight. Where inertia has carried them to a fifth of the radius they come off at once.
+//! Cloth does not fray by its own weight. Where inertia has carried them to a fifth of the radius they come off
+//! at once.
 //!
 //! Where several yarns of one group are left at a node, each gets its own. Material coordinates of ends and of nodes
-//! of one yarn are constants from then on, so that lengths and masses stay what they are. Momentum:
-//! each yarn's `sum rho/2 (du (x0' + x1') - (x1 - x0)(u0' + u1'))` is what it was, by the velocities of the nodes
-//! that it changed at. Anchors there begin anew. SI units.
+//! of one yarn are constants from then on, so that lengths and masses stay what they are. Momentum: what each yarn
+//! loses of `sum rho/2 (du (x0' + x1') - (x1 - x0)(u0' + u1'))` the nodes that it changed at get back as velocity.
+//! Anchors there begin anew. SI units.
 
 use super::passing::{Passages, Passing};
 use crate::error::Result;
@@ -315,8 +318,10 @@ impl Change<'_> {
             }
         }
         let masses = masses(&new, state);
-        for (y, before) in yarns.into_iter().zip(before) {
-            let lost = before - momentum(&new, y, first, state);
+        let lost: Vec<Vec3> = (yarns.iter().zip(before))
+            .map(|(y, before)| before - momentum(&new, *y, first, state))
+            .collect();
+        for (y, lost) in yarns.into_iter().zip(lost) {
             let mut nodes: Vec<u32> = (self.touched.iter())
                 .filter(|i| self.passages.yarn(**i) == y)
                 .filter_map(|i| self.passages.node[*i])
