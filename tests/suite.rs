@@ -108,6 +108,8 @@ mod tri_real;
 mod yarn_charts;
 #[path = "yarn_contacts.rs"]
 mod yarn_contacts;
+#[path = "yarn_fabrics.rs"]
+mod yarn_fabrics;
 #[path = "yarn_friction.rs"]
 mod yarn_friction;
 #[path = "yarn_garments.rs"]

@@ -42,50 +42,6 @@ fn knit(structure: &str, loops: usize) -> String {
     patch(&yarns, width, height, WHOLE)
 }
 
-/// Mean height over the middle of the patch of its `[left and right, bottom and top]` rims, towards
-/// the front, in loop widths.
-fn rims(sim: &Sim) -> [f64; 2] {
-    let mesh = sim.yarns().expect("yarns");
-    let high = mesh.uv.iter().fold(mesh.uv[0], |m, p| m.sup(p));
-    let mean = |wanted: &dyn Fn(f64, f64) -> bool| {
-        let list = mesh.uv.iter().zip(sim.yarn_nodes());
-        let kept: Vec<f64> = list
-            .filter(|(p, _)| wanted(p.x / high.x - 0.5, p.y / high.y - 0.5))
-            .map(|(_, x)| x.z / 0.003)
-            .collect();
-        kept.iter().sum::<f64>() / kept.len() as f64
-    };
-    let middle = mean(&|u, v| u.abs() < 0.15 && v.abs() < 0.15);
-    [
-        mean(&|u, v| u.abs() > 0.4 && v.abs() < 0.2) - middle,
-        mean(&|u, v| v.abs() > 0.4 && u.abs() < 0.2) - middle,
-    ]
-}
-
-fn relaxed(structure: &str) -> Sim {
-    let mut sim = sim(&knit(structure, 8), 0.0, &[]);
-    let options = DrapeOptions {
-        force_tolerance: 1e-5,
-        max_steps: 400,
-    };
-    let _ = sim.drape(&options, &mut |_| true).expect("drape");
-    sim
-}
-
-/// Knit loops carry their heads and feet to the back and their legs to the front when they relax: the
-/// top and bottom of jersey roll to the front, its sides to the back, and purl jersey is its mirror.
-#[test]
-fn jersey_curls_as_jersey_does() {
-    let [sides, ends] = rims(&relaxed("stockinette"));
-    println!("stockinette: sides {sides:.2}, ends {ends:.2} loop widths towards the front");
-    assert!(ends > 0.5, "{ends}");
-    assert!(sides < -0.2, "{sides}");
-    let [sides, ends] = rims(&relaxed("reverse stockinette"));
-    println!("reverse: sides {sides:.2}, ends {ends:.2}");
-    assert!(ends < -0.5, "{ends}");
-    assert!(sides > 0.2, "{sides}");
-}
-
 /// A plain weave pulled along one family is `N` straight yarns: `F = N k_s eps`.
 #[test]
 fn a_weave_pulled_along_its_yarns_is_as_stiff_as_they_are() {

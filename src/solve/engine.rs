@@ -8,6 +8,7 @@ use super::linear::direct::Direct;
 use super::linear::ordering::seam_priorities;
 use super::linear::{LinearSolver, choose};
 use super::newton::{Inertia, Problem, Summary, Tolerance, Work, largest};
+use super::pace::ALMOST;
 use super::settings::Settings;
 use crate::error::Result;
 use crate::math::Vec3;
@@ -18,6 +19,9 @@ use crate::system::build::{BuildOptions, System};
 use crate::system::state::State;
 use crate::system::term::{Configuration, World};
 
+/// Blocks of a system with yarns below which every matrix is factored: conjugate gradients take many
+/// iterations on yarns, whose stretch is 1e4 times as stiff as their bending.
+const ALWAYS_DIRECT_YARNS: usize = 20_000;
 /// Corrections of one attempt at rest.
 const REST_ITERATIONS: u32 = 8;
 
@@ -59,8 +63,8 @@ pub enum Motion {
     Dynamic,
     /// Towards rest by one semi-implicit step: one Newton correction, rate terms off.
     Relax {
-        /// Whether the exact Hessian is tried.
-        exact: bool,
+        /// How much of the exact Hessian is tried.
+        exact: f64,
         /// Whether friction anchors and normal forces follow the step.
         follow: bool,
     },
@@ -251,6 +255,11 @@ impl Engine {
             } else {
                 0.0
             },
+            motion: if dynamic && system.has_yarns() {
+                self.settings.yarn_relative_velocity
+            } else {
+                0.0
+            },
             force: match motion {
                 Motion::Rest { force } => force,
                 _ => 0.0,
@@ -266,14 +275,17 @@ impl Engine {
             } else {
                 (10.0 * self.settings.linear_tolerance).min(0.1)
             },
-            exactness: f64::from(u8::from(matches!(
-                motion,
-                Motion::Relax { exact: true, .. } | Motion::Rest { .. }
-            ))),
-            most_exactness: f64::from(u8::from(!matches!(
-                motion,
-                Motion::Relax { exact: false, .. }
-            ))),
+            exactness: match motion {
+                Motion::Dynamic => 0.0,
+                Motion::Relax { exact, .. } => exact,
+                Motion::Rest { .. } => 1.0,
+            },
+            most_exactness: match motion {
+                Motion::Relax { exact, .. } => exact,
+                Motion::Dynamic if system.has_yarns() => ALMOST,
+                _ => 1.0,
+            },
+            hasty: system.has_yarns(),
             strict: rest,
         };
         let linear: &mut dyn LinearSolver = if rest {
@@ -399,12 +411,11 @@ impl Engine {
 }
 
 fn linear_solver(system: &System, settings: &Settings, workers: &Workers) -> Box<dyn LinearSolver> {
-    let mesh = &system.cloth.mesh;
-    let priorities = seam_priorities(mesh);
-    choose::solver(
-        settings.linear_kind as u32,
-        mesh.uv.len(),
-        Some(&priorities),
-        workers,
-    )
+    let priorities = (!system.has_yarns()).then(|| seam_priorities(&system.cloth.mesh));
+    let blocks = system.block_count();
+    let kind = match settings.linear_kind as u32 {
+        0 if system.has_yarns() && blocks < ALWAYS_DIRECT_YARNS => 1,
+        kind => kind,
+    };
+    choose::solver(kind, blocks, priorities.as_deref(), workers)
 }

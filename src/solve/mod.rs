@@ -7,6 +7,7 @@ mod drift;
 pub mod engine;
 pub mod linear;
 pub mod newton;
+mod pace;
 pub mod relax;
 pub mod report;
 pub mod rest;

@@ -34,6 +34,9 @@ pub struct Tolerance {
     pub displacement: f64,
     /// Decrease of `Phi` in an iteration over that in all of them.
     pub relative: f64,
+    /// A full correction over the whole displacement, both as root mean squares weighted by what
+    /// inertia resists with.
+    pub motion: f64,
     /// Largest force on a free vertex [N].
     pub force: f64,
     /// Newton iterations.
@@ -44,6 +47,9 @@ pub struct Tolerance {
     pub exactness: f64,
     /// How much of it is tried later.
     pub most_exactness: f64,
+    /// Whether all of that is tried as soon as a full correction does what its model promised, instead
+    /// of step by step.
+    pub hasty: bool,
     /// Whether a matrix that is not positive definite ends the solve instead of being made so by
     /// less of the exact Hessian.
     pub strict: bool,
@@ -69,6 +75,8 @@ pub struct Summary {
     pub moved: f64,
     /// How much of the exact Hessian the last correction used.
     pub exactness: f64,
+    /// Decrease of `Phi` by the last correction over what its quadratic model promised.
+    pub agreement: f64,
     /// Whether a strict solve met a matrix that is not positive definite.
     pub indefinite: bool,
     /// Corrections by a matrix at a point where nothing was carried any more.
@@ -122,6 +130,8 @@ impl Work {
 
 /// Part of the displacement tolerance below which a force that inertia alone resists is no force.
 const UNMOVED: f64 = 1e-3;
+/// Decrease over the promised one from which a model is to be trusted.
+const AGREES: f64 = 0.5;
 /// Small corrections in one solve that are not taken for convergence at once.
 const DOUBTS: u32 = 4;
 
@@ -315,6 +325,7 @@ impl Problem<'_> {
                         return Ok(summary);
                     }
                     Err(_) if exactness > 0.0 => {
+                        summary.indefinite = true;
                         exactness = if exactness > 0.3 {
                             0.5 * exactness
                         } else {
@@ -353,11 +364,14 @@ impl Problem<'_> {
                 }
             }
             summary.last_length = length;
+            summary.agreement = -gain / (slope * length * (1.0 - 0.5 * length));
             summary.moved = length * reach;
             exactness = if tolerance.strict {
                 exactness
             } else if length < 1.0 {
                 0.0
+            } else if tolerance.hasty && summary.agreement > AGREES && !summary.indefinite {
+                tolerance.most_exactness
             } else {
                 (2.0 * exactness).max(0.25).min(tolerance.most_exactness)
             };
@@ -367,6 +381,18 @@ impl Problem<'_> {
             if tolerance.relative > 0.0 && gain <= tolerance.relative * (first - value) {
                 summary.converged = true;
                 return Ok(summary);
+            }
+            if tolerance.motion > 0.0 && length == 1.0 {
+                let weighed = |from: &dyn Fn(usize) -> Vec3| {
+                    let square = |i| self.inertia.measure[i] * from(i).norm_squared();
+                    (0..n).map(square).sum::<f64>()
+                };
+                let last = weighed(&|i| work.direction[i]);
+                let whole = weighed(&|i| x[i] - self.x0[i]);
+                if last <= tolerance.motion * tolerance.motion * whole {
+                    summary.converged = true;
+                    return Ok(summary);
+                }
             }
             if length * reach <= tolerance.displacement {
                 // where friction sticks in the model but slips in truth the correction is small and

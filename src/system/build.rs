@@ -247,6 +247,11 @@ impl System {
         parts
     }
 
+    /// Whether yarns are simulated.
+    pub fn has_yarns(&self) -> bool {
+        self.yarns.is_some()
+    }
+
     /// Mean rest length of the edges, of the yarns' segments where there are no triangles [m].
     pub fn mean_edge(&self) -> f64 {
         if let (true, Some(yarns)) = (self.edges.is_empty(), &self.yarns) {
