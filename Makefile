@@ -2,7 +2,7 @@
 #   make demo    build, compile a C host, drape a garment on a body, leave a picture and a model file
 #   make test    the whole check, the same as on the build machine
 #   make quick   unit tests only, under a minute once built
-#   make bench   tables of speed and error
+#   make bench   tables of speed and error; bench-yarn: those of yarns
 #   make fuzz    every fuzz target, FUZZ_SECONDS (20) each
 #   make soak    the long random runs, fuzz targets included
 #   make wheel   the Python package with the library as one file, in out/wheels
@@ -17,7 +17,7 @@ LIB    := target/release/libtoile.so
 PYTHON := target/venv/bin/python
 export TOILE_PYTHON ?= $(abspath $(PYTHON))
 
-.PHONY: all demo test quick bench fuzz soak header wheel install tools lint clean
+.PHONY: all demo test quick bench bench-yarn fuzz soak header wheel install tools lint clean
 
 all:
 	$(CARGO) build --release
@@ -45,6 +45,10 @@ quick:
 
 bench: all
 	$(CARGO) bench
+
+bench-yarn: all
+	$(CARGO) bench --bench yarn
+	$(CARGO) bench --bench yarn_terms
 
 fuzz:
 	@bash scripts/fuzz.sh $(FUZZ_SECONDS)

@@ -2,10 +2,11 @@
 
     target/venv/bin/python benches/hosts.py
 
-Processor seconds of one sheet of more than 10,000 vertices that hangs over a ball, driven in turn
-through the FMI 3 functions and through the C functions; both take the same steps to the same bits, so
-that the solver's work is the same. Of several rounds the least is taken, step by step. Needs the built
-program and library, FMPy is not needed.
+Processor seconds of one sheet of more than 10,000 vertices that hangs over a ball. Two simulations of
+it in this process take the same short steps to the same bits, one through the layer that is measured, one
+through C; whose turn is first alternates. What a busy machine adds to one step it adds to its neighbour,
+too: the median of the ratios of pairs is told, with the quartiles. Needs the built program and library
+and a C compiler.
 """
 
 import ctypes
@@ -29,7 +30,9 @@ import scenes  # noqa: E402
 import toile  # noqa: E402
 from master import OK, Fmu  # noqa: E402
 
-STEP, STEPS, ROUNDS = 0.01, 3, 5
+STEP, ROUNDS = 0.01, 5
+# short steps, so that there are many pairs
+SHORT, PAIRS = 0.001, 41
 ARRAYS = ["vertex.position", "vertex.velocity", "vertex.normal"]
 
 
@@ -74,34 +77,43 @@ def read_fmi(cloth, rooms):
         assert status == OK
 
 
-def steps_and_arrays(fmu):
-    rooms = [room(fmu, name) for name in ARRAYS]
-    rows = {"step, FMI": [], "step, C": [], "arrays, FMI": [], "arrays, C": []}
-    for k in range(ROUNDS):
-        cloth, sim, arrays = by_fmi(fmu), by_c(fmu), {}
+def pairs(one, other):
+    """Processor seconds of two calls, made in turn `PAIRS` times: medians of both, and quartiles of the
+    ratio."""
+    times = np.empty((PAIRS, 2))
+    for i in range(PAIRS):
+        for side, call in ((0, one), (1, other))[:: -1 if i % 2 else 1]:
+            times[i, side] = call(i)
+    return *np.median(times, axis=0), np.quantile(times[:, 0] / times[:, 1], [0.25, 0.5, 0.75])
 
-        def copy():
+
+def percent(quartiles):
+    low, middle, high = 100 * (quartiles - 1)
+    return f"{middle:+.2f} % (quartiles {low:+.2f} to {high:+.2f})"
+
+
+def layer_and_c(fmu):
+    """A step and all arrays, through FMI and through C; the arrays alone."""
+    rooms = [room(fmu, name) for name in ARRAYS]
+    cloth, sim, arrays, alone = by_fmi(fmu), by_c(fmu), {}, []
+
+    def by_layer(i):
+        step = spent(lambda: cloth.run(1, SHORT, first=i))
+        alone.append(spent(lambda: read_fmi(cloth, rooms)))
+        return step + alone[-1]
+
+    def directly(_):
+        def call():
+            sim.step(SHORT)
             arrays.update(p=sim.positions.copy(), v=sim.velocities.copy(), n=sim.normals)
 
-        found = {name: [] for name in rows}
-        for i in range(STEPS):
-            calls = [
-                ("step, FMI", lambda: cloth.run(1, STEP, first=i)),
-                ("step, C", lambda: sim.step(STEP)),
-                ("arrays, FMI", lambda: read_fmi(cloth, rooms)),
-                ("arrays, C", copy),
-            ]
-            # neither is always the first to find the caches cold
-            if (i + k) % 2:
-                calls[:2] = reversed(calls[:2])
-            for name, call in calls:
-                found[name].append(spent(call))
-            assert np.array_equal(rooms[0][1], arrays["p"]), "other bits, other work"
-        for name, values in found.items():
-            rows[name].append(values)
-        cloth.free()
-        sim.close()
-    return {name: np.min(values, axis=0).mean() for name, values in rows.items()}
+        return spent(call)
+
+    found = pairs(by_layer, directly)
+    assert np.array_equal(rooms[0][1], arrays["p"]), "other bits, other work"
+    cloth.free()
+    sim.close()
+    return *found, np.median(alone)
 
 
 def outputs(fmu, step):
@@ -115,8 +127,8 @@ def outputs(fmu, step):
     }
     times = {name: [] for name in groups}
     cloth = by_fmi(fmu)
-    for i in range(STEPS):
-        cloth.run(1, STEP, first=i)
+    for i in range(ROUNDS):
+        cloth.run(1, SHORT, first=i)
         for name, variables in groups.items():
             call = (lambda: cloth.get(*variables)) if variables else cloth.snapshot
             if variables and fmu.variables[variables[0]].shape:
@@ -172,66 +184,55 @@ def scaling(fmu):
 
 
 C = r"""
-#include <stdio.h>
-#include <stdlib.h>
 #include <time.h>
 #include "toile.h"
-int main(int count, char **argument) {
-    if (count != 5) return 2;
-    FILE *file = fopen(argument[1], "rb");
-    char *text = malloc(1 << 24);
-    size_t length = fread(text, 1, 1 << 24, file), needed = 0;
-    fclose(file);
-    toile_sim *sim = NULL;
-    if (toile_sim_from_scene(text, length, argument[2], &sim)) return 3;
-    toile_sim_positions(sim, NULL, 0, &needed);
-    double *x = malloc(needed * sizeof *x), sum = 0;
-    clock_t begun = clock();
-    for (int i = 0; i < atoi(argument[3]); ++i) {
-        if (toile_sim_step(sim, atof(argument[4]), NULL)) return 4;
-        if (toile_sim_positions(sim, x, needed, &needed)) return 5;
-        sum += x[1];
-    }
-    printf("%.6f %.17g\n", (double)(clock() - begun) / CLOCKS_PER_SEC, sum);
-    return 0;
+static double now(void) {
+    struct timespec at;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &at);
+    return at.tv_sec + 1e-9 * at.tv_nsec;
 }
-"""
-PYTHON = """
-import sys, time
-import toile
-from pathlib import Path
-text, folder, steps, dt = Path(sys.argv[1]).read_text(), sys.argv[2], int(sys.argv[3]), float(sys.argv[4])
-sim, total = toile.Sim.from_scene(text, folder), 0.0
-begun = time.process_time()
-for _ in range(steps):
-    sim.step(dt)
-    x = sim.positions
-    total += x[0, 1]
-print(f"{time.process_time() - begun:.6f} {total:.17g}")
+/* Processor seconds of a step and of reading the positions; negative if a call failed. */
+double drive(toile_sim *sim, double dt, double *x, size_t count) {
+    double begun = now();
+    size_t needed = 0;
+    if (toile_sim_step(sim, dt, NULL)) return -1;
+    if (toile_sim_positions(sim, x, count, &needed)) return -1;
+    return now() - begun;
+}
 """
 
 
 def python_and_c(fmu, folder):
-    source, program = folder / "drive.c", folder / "drive"
+    """A step and the positions, in Python and in C."""
+    source, built = folder / "drive.c", folder / "drive.so"
     source.write_text(C)
     subprocess.run(
-        ["cc", "-std=c11", "-O2", f"-I{ROOT / 'include'}", source, "-o", program, f"-L{RELEASE}",
-         "-ltoile", f"-Wl,-rpath,{RELEASE}"], check=True,
+        ["cc", "-std=gnu11", "-O2", "-shared", "-fPIC", f"-I{ROOT / 'include'}", source, "-o", built,
+         os.environ["TOILE_LIBRARY"]], check=True,
     )
-    scene = fmu.resources / "scene.json"
-    arguments = [scene, scene.parent, str(STEPS), str(STEP)]
-    times, sums = {"C": [], "Python": []}, set()
-    for _ in range(ROUNDS):
-        for name, command in (("Python", [sys.executable, "-c", PYTHON]), ("C", [program])):
-            done = subprocess.run(
-                [*command, *arguments], check=True, capture_output=True, text=True,
-                env={**os.environ, "PYTHONPATH": str(ROOT / "python")},
-            )
-            seconds, total = done.stdout.split()
-            times[name].append(float(seconds) / STEPS)
-            sums.add(total)
-    assert len(sums) == 1, "other bits, other work"
-    return {name: min(t) for name, t in times.items()}
+    drive = ctypes.CDLL(str(built)).drive
+    drive.restype = ctypes.c_double
+    drive.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_void_p, ctypes.c_size_t]
+    one, other, seen = by_c(fmu), by_c(fmu), {}
+    x = np.empty(one.positions.shape)
+
+    def in_python(_):
+        def call():
+            one.step(SHORT)
+            seen["x"] = one.positions
+
+        return spent(call)
+
+    def in_c(_):
+        seconds = drive(other.handle, SHORT, x.ctypes.data, x.size)
+        assert seconds > 0
+        return seconds
+
+    found = pairs(in_python, in_c)
+    assert np.array_equal(seen["x"], x), "other bits, other work"
+    one.close()
+    other.close()
+    return found
 
 
 def main():
@@ -240,17 +241,13 @@ def main():
         large = pack(folder, "large", 0.0062)
         n = large.variables["vertex.count"].attributes["start"]
         print(f"{n} vertices")
-        rows = steps_and_arrays(large)
-        for name, seconds in rows.items():
-            print(f"{name:24s} {1e3 * seconds:9.2f} ms")
-        one, other = (sum(rows[k] for k in rows if k.endswith(w)) for w in ("FMI", "C"))
-        print(f"FMI over C, arrays read: {100 * (one / other - 1):+.2f} %")
-        print(f"the arrays beside a step: {100 * rows['arrays, FMI'] / rows['step, FMI']:.2f} %")
-        for name, (ms, share) in outputs(large, rows["step, FMI"]).items():
-            print(f"  {name:24s} {ms:9.3f} ms {share:6.2f} %")
-        both = python_and_c(large, folder)
-        print(", ".join(f"{k} {1e3 * v:.1f} ms a step" for k, v in both.items()), end=": ")
-        print(f"Python over C {100 * (both['Python'] / both['C'] - 1):+.2f} %")
+        layer, direct, ratio, arrays = layer_and_c(large)
+        print(f"step and arrays: FMI {1e3 * layer:.2f} ms, C {1e3 * direct:.2f} ms: {percent(ratio)}")
+        print(f"the arrays alone: {1e3 * arrays:.2f} ms, {100 * arrays / layer:.2f} % of that")
+        for name, (ms, share) in outputs(large, layer).items():
+            print(f"  {name:24s} {ms:9.3f} ms {share:6.2f} % of a step")
+        python, c, ratio = python_and_c(large, folder)
+        print(f"step and positions: Python {1e3 * python:.2f} ms, C {1e3 * c:.2f} ms: {percent(ratio)}")
         whole, scene = loading(large)
         print(f"load {whole:.3f} s, the scene's own {scene:.3f} s: the rest {whole - scene:+.3f} s")
         walls = scaling(pack(folder, "small", 0.02))

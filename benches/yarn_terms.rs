@@ -14,6 +14,7 @@
 mod common;
 
 use common::{Random, cpu};
+use toile::blend::Riders;
 use toile::body::Distance;
 use toile::math::parallel::Workers;
 use toile::math::{Vec2, Vec3};
@@ -205,6 +206,7 @@ fn main() {
         let spent = (cpu() - from) / f64::from(UPDATES);
         table.entry("compression").or_default()[column] = 1e6 * spent / nodes;
         let state = State {
+            topology: Default::default(),
             time: 0.0,
             velocities: vec![Vec3::zeros(); x.len()],
             positions: x.clone(),
@@ -237,7 +239,7 @@ fn main() {
         for term in all {
             let name = term.name();
             let one = [term];
-            let mut assembler = Assembler::new(x.len(), &one);
+            let mut assembler = Assembler::new(x.len(), &one, &Riders::default());
             assembler.add(&one, &at, Some(HessianKind::Psd), &workers, &mut gradient);
             const ROUNDS: u32 = 10;
             let from = cpu();

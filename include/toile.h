@@ -238,7 +238,7 @@ typedef struct toile_garment_desc {
      */
     const char *name;
     /**
-     * Target edge length of the triangles [m]; a panel may have its own. Default 0.02.
+     * Target edge length of the triangles [m]; a panel may have its own. Default 0.015.
      */
     double edge_length;
 } toile_garment_desc;
@@ -658,7 +658,42 @@ typedef struct toile_system_info {
      * Smallest angle of a triangle [rad].
      */
     double min_angle;
+    /**
+     * Triangles that are simulated; yarns stand for the others.
+     */
+    uint64_t active_triangles;
+    /**
+     * Nodes of yarns that triangles carry.
+     */
+    uint64_t carried_nodes;
 } toile_system_info;
+
+/**
+ * What is not as the yarns were laid.
+ */
+typedef struct toile_yarn_changes {
+    /**
+     * sizeof(toile_yarn_changes), set by the caller.
+     */
+    size_t struct_size;
+    /**
+     * Grows whenever any of these numbers, or the arrays that count nodes and passages, change. 0 without
+     * yarns, 1 as laid.
+     */
+    uint64_t epoch;
+    /**
+     * Passages of yarns through nodes that are gone.
+     */
+    uint64_t passages_gone;
+    /**
+     * Nodes that came out of others where yarns parted.
+     */
+    uint64_t nodes_split;
+    /**
+     * Nodes that no yarn passes any more.
+     */
+    uint64_t nodes_left;
+} toile_yarn_changes;
 
 /**
  * Numbers that lie in the library's memory. Valid until the next call on the same handle whose
@@ -764,6 +799,11 @@ toile_status toile_energies_init(struct toile_energies *out, size_t struct_size)
  * Fills system information of `struct_size` bytes with zeros and its own size.
  */
 toile_status toile_system_info_init(struct toile_system_info *out, size_t struct_size);
+
+/**
+ * Fills changes of yarns of `struct_size` bytes with zeros and its own size.
+ */
+toile_status toile_yarn_changes_init(struct toile_yarn_changes *out, size_t struct_size);
 
 /**
  * Fills a view of `struct_size` bytes with zeros and its own size.
@@ -970,8 +1010,8 @@ void toile_body_free(struct toile_body *body);
  * Triangulates a garment and makes it ready to move; its vertices stand where the panels are
  * placed. `desc` NULL takes the defaults. The garment may be changed or freed afterwards. Free the
  * simulation with toile_sim_free. TOILE_E_GEOMETRY and TOILE_E_LIMIT name the panel;
- * TOILE_E_UNSUPPORTED: a blend region covers a panel in part, or a panel of yarns is sewn to one of
- * triangles.
+ * TOILE_E_ARGUMENT: a blend region holds no triangle, or its fabric has no yarns;
+ * TOILE_E_UNSUPPORTED: a region that covers a panel in part has hybrid rings.
  */
 toile_status toile_sim_create(const struct toile_garment *garment,
                               const struct toile_sim_desc *desc,
@@ -1005,8 +1045,8 @@ toile_status toile_sim_set_body_sdf(struct toile_sim *sim,
 /**
  * Says where a body is to be at the end of the next step: position [m] of its origin and rotation
  * x, y, z, w. The cloth feels the velocity that follows. Before the first step or drape it is a
- * placement: the body stands there at once and has no velocity. A drape takes the body to its pose
- * before it begins.
+ * placement: the body stands there at once and has no velocity. A drape takes the body to its pose, and
+ * cloth that rests on it goes along.
  */
 toile_status toile_sim_set_body_pose(struct toile_sim *sim,
                                      uint32_t body,
@@ -1282,6 +1322,10 @@ toile_status toile_sim_backend(const struct toile_sim *sim,
 /**
  * World positions of the yarns' nodes [m], shape [node_count, 3]; sizes as in toile_sim_positions.
  * Empty in a garment of triangles alone.
+ *
+ * Nodes keep their numbers. Where yarns come out of contacts (toile_sim_yarn_changes tells) new nodes are counted
+ * on at the end, and nodes that no yarn passes any more stay where they were; the sizes of this and of the
+ * arrays below change then.
  */
 toile_status toile_sim_yarn_nodes(const struct toile_sim *sim,
                                   double *out,
@@ -1343,8 +1387,51 @@ toile_status toile_sim_yarn_slips(const struct toile_sim *sim,
                                   size_t *needed);
 
 /**
- * Holds nodes of yarns, as toile_sim_pin holds vertices; yarns do not slide where they are held.
- * TOILE_E_ARGUMENT names a node that does not exist.
+ * 1 for each node that moves by itself, 0 for one that the triangles around a region of yarns carry,
+ * shape [node_count]; sizes as in toile_sim_positions.
+ */
+toile_status toile_sim_yarn_active(const struct toile_sim *sim,
+                                   uint8_t *out,
+                                   size_t capacity,
+                                   size_t *needed);
+
+/**
+ * Force on each node of the yarns and of what acts on them [N], shape [node_count, 3]: on a node that is held
+ * what its holder bears. Inertia is no part of it. Sizes as in toile_sim_positions.
+ */
+toile_status toile_sim_yarn_forces(const struct toile_sim *sim,
+                                   double *out,
+                                   size_t capacity,
+                                   size_t *needed);
+
+/**
+ * What has changed since the yarns were laid: contacts that yarns came out of. `epoch` grows with every step, drape or
+ * restored state that changes it.
+ */
+toile_status toile_sim_yarn_changes(const struct toile_sim *sim,
+                                    struct toile_yarn_changes *out);
+
+/**
+ * Node of a panel's yarns that was laid nearest to a point of the panel, in flat coordinates [m].
+ * TOILE_E_ARGUMENT: the panel is not simulated as yarns.
+ */
+toile_status toile_sim_locate_yarn_node(const struct toile_sim *sim,
+                                        uint32_t panel,
+                                        const double uv[2],
+                                        uint32_t *out_node);
+
+/**
+ * Node at the first (0) or the last (1) end of a yarn. TOILE_E_ARGUMENT names a yarn that does not exist.
+ */
+toile_status toile_sim_yarn_end(const struct toile_sim *sim,
+                                uint32_t yarn,
+                                uint32_t end,
+                                uint32_t *out_node);
+
+/**
+ * Holds nodes of yarns, as toile_sim_pin holds vertices; yarns do not slide where they are held,
+ * and no contact comes off there. A yarn is held whole by all of its nodes. TOILE_E_ARGUMENT names a node that does
+ * not exist, or that no yarn passes any more.
  */
 toile_status toile_sim_pin_yarn_nodes(struct toile_sim *sim,
                                       const uint32_t *nodes,

@@ -12,6 +12,7 @@ pub mod fmi;
 pub mod math;
 pub mod pattern;
 pub mod readout;
+pub mod report;
 pub mod scene;
 pub mod sim;
 pub mod sim_scene;

@@ -1,13 +1,15 @@
 //! The one Rust facade: a garment in a world, stepped, draped, edited, saved, restored.
 //!
 //! Here: making, saving and restoring a [`Sim`]. `run` lets time pass, `world` edits what is around
-//! the cloth, `read` tells what there is.
+//! the cloth, `pins` holds it, `read` tells what there is.
 
+mod pins;
 mod read;
 mod run;
 mod world;
 mod yarns;
 
+use crate::blend::Riders;
 use crate::body::Body;
 use crate::cloth::Cloth;
 use crate::error::{Error, Result};
@@ -21,8 +23,10 @@ use crate::system::snapshot::{self, Origin};
 use crate::system::state::State;
 pub use crate::system::term::ContactSettings;
 use crate::tri::GarmentMesh;
+use crate::yarn::Topology;
 pub use read::SystemInfo;
 use std::sync::{Mutex, MutexGuard, PoisonError};
+pub use yarns::YarnChanges;
 use yarns::YarnPart;
 
 /// What a simulation is created with besides the garment.
@@ -89,21 +93,25 @@ impl Sim {
         finite("pressure", &[options.pressure])?;
         let mut cloth = Cloth::new(garment, mesh.clone())?;
         let masses = cloth.masses.clone();
-        let origin = Origin {
-            garment: snapshot::fingerprint(&cloth),
-            bodies: Vec::new(),
-            numbers: options.settings.that_matter(),
-        };
         let yarns = YarnPart::new(garment, &mesh, &options.settings)?;
         if let Some(part) = &yarns {
             cloth = part.rest_of(garment, &mesh)?;
         }
-        let laid = yarns.as_ref().map(|part| part.yarns.clone());
-        let system = System::with_yarns(cloth, laid, &BuildOptions::from(&options.settings))?;
+        let origin = Origin {
+            garment: snapshot::fingerprint(&cloth, &garment.blend_regions),
+            bodies: Vec::new(),
+            numbers: options.settings.that_matter(),
+        };
+        let laid = yarns.as_ref().map(|part| part.now.clone());
+        let alone = Riders::default();
+        let riders = yarns.as_ref().map_or(&alone, |part| &part.riders);
+        let build = BuildOptions::from(&options.settings);
+        let system = System::with_yarns(cloth, laid, riders, &build)?;
         let mut state = State {
             time: 0.0,
             positions: mesh.placed.clone(),
             velocities: vec![Vec3::zeros(); mesh.placed.len()],
+            topology: Topology::default(),
             u: Vec::new(),
             u_rates: Vec::new(),
             sliding: Vec::new(),
@@ -155,9 +163,10 @@ impl Sim {
     }
 
     /// Goes back to a state that this simulation was in.
-    pub fn roll_back(&mut self, state: State) {
+    pub fn roll_back(&mut self, state: State) -> Result<()> {
         self.state = state;
         self.epoch += 1;
+        self.take_yarns()
     }
 
     /// Restores saved bytes of the same garment, bodies and tunables (threads and the limit of
@@ -176,6 +185,11 @@ impl Sim {
             }
         }
         std::mem::swap(&mut self.state, &mut state);
+        if let Err(error) = self.take_yarns().and_then(|()| self.check_coordinates()) {
+            self.state = state;
+            self.take_yarns()?;
+            return Err(error.at("snapshot"));
+        }
         self.epoch += 1;
         Ok(())
     }

@@ -2,7 +2,7 @@
 //!
 //! [`build`] compiles the garment, places bodies and pins and puts the initial state in. A
 //! [`Driver`] then tells the simulation, before each step, where bodies and pins are at its end.
-//! [`pinned_vertices`] and [`along`] find the vertices that pins and probes of a scene mean.
+//! [`pinned_points`] and [`along`] find the points that pins and probes of a scene mean.
 
 use crate::body::Pose;
 use crate::error::{Error, Result};
@@ -55,17 +55,17 @@ pub fn build(scene: &Scene) -> Result<Sim> {
         let v = vec![scene.initial.velocity; count];
         sim.set_positions(&x, Some(&v)).map_err(place)?;
     }
-    let pins = pinned_vertices(&sim, scene)?;
-    for (i, (pin, vertices)) in scene.pins.iter().zip(&pins).enumerate() {
+    let pins = pinned_points(&sim, scene)?;
+    for (i, (pin, points)) in scene.pins.iter().zip(&pins).enumerate() {
         let start = motion::offset(&pin.motion, 0.0);
-        let targets: Vec<[f64; 3]> = vertices
+        let targets: Vec<[f64; 3]> = points
             .iter()
-            .map(|&v| {
-                let home = sim.positions()[v as usize].into();
+            .map(|&p| {
+                let home = sim.points()[p as usize].into();
                 add(pin.target.unwrap_or(home), start.into())
             })
             .collect();
-        sim.pin(vertices, Some(&targets))
+        sim.pin_points(points, Some(&targets))
             .map_err(|e| e.at(format!("pins[{i}]")))?;
     }
     Ok(sim)
@@ -80,8 +80,8 @@ fn add(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|k| a[k] + b[k])
 }
 
-/// Vertices of each pin of the scene.
-pub fn pinned_vertices(sim: &Sim, scene: &Scene) -> Result<Vec<Vec<u32>>> {
+/// Points of each pin of the scene: vertices, nodes where the panel is simulated as yarns.
+pub fn pinned_points(sim: &Sim, scene: &Scene) -> Result<Vec<Vec<u32>>> {
     scene
         .pins
         .iter()
@@ -90,18 +90,38 @@ pub fn pinned_vertices(sim: &Sim, scene: &Scene) -> Result<Vec<Vec<u32>>> {
         .collect()
 }
 
-/// Vertices at a place of a panel: one, or those of an edge in rising order without repetition.
+/// Points at a place of a panel: one, or those of an edge or of a yarn in rising order without repetition.
 fn place(sim: &Sim, panel: u32, place: PinPlace) -> Result<Vec<u32>> {
-    match place {
-        PinPlace::Point(uv) => sim.locate(panel, uv).map(|v| vec![v]),
+    let nodes = match place {
+        PinPlace::Point(uv) => {
+            let vertex = sim.locate(panel, uv)?;
+            if sim.moves_by_itself(vertex) {
+                return Ok(vec![vertex]);
+            }
+            vec![sim.locate_yarn_node(panel, uv)?]
+        }
         PinPlace::Edge(edge) => {
             // a closed edge starts and ends at one vertex
-            let mut vertices = along(sim, panel, edge)?.to_vec();
-            vertices.sort_unstable();
-            vertices.dedup();
-            Ok(vertices)
+            let vertices = along(sim, panel, edge)?.iter().copied();
+            let nodes = sim.yarn_nodes_along(panel, edge)?.into_iter();
+            let all = vertices.chain(nodes.map(|n| sim.point_of_node(n)));
+            return Ok(sorted(all.filter(|p| sim.moves_by_itself(*p)).collect()));
         }
-    }
+        PinPlace::Yarn { yarn, end: None } => sim.yarn(yarn)?,
+        PinPlace::Yarn {
+            yarn,
+            end: Some(end),
+        } => vec![sim.yarn_end(yarn, end)?],
+    };
+    Ok(sorted(
+        nodes.into_iter().map(|n| sim.point_of_node(n)).collect(),
+    ))
+}
+
+fn sorted(mut points: Vec<u32>) -> Vec<u32> {
+    points.sort_unstable();
+    points.dedup();
+    points
 }
 
 /// Vertices along an edge of a panel, from its start to its end.
@@ -117,7 +137,7 @@ pub fn along(sim: &Sim, panel: u32, edge: u32) -> Result<&[u32]> {
 /// Moves bodies and pins of a scene.
 #[derive(Clone, Debug)]
 pub struct Driver {
-    /// Vertices of each pin, and where each is without motion [m].
+    /// Points of each pin, and where each is without motion [m].
     pins: Vec<Vec<(u32, [f64; 3])>>,
     held: Vec<bool>,
 }
@@ -126,16 +146,14 @@ impl Driver {
     /// Takes the pins' places from a simulation as [`build`] gives it: call this before anything
     /// runs.
     pub fn new(sim: &Sim, scene: &Scene) -> Result<Self> {
-        let pins = pinned_vertices(sim, scene)?;
+        let pins = pinned_points(sim, scene)?;
         // a restored pin may have moved: its place is where the panel is placed
-        let placed = &sim.mesh().placed;
         let restored = scene.initial.snapshot.is_some();
-        let home = |v: u32| {
-            let v = v as usize;
+        let home = |p: u32| {
             if restored {
-                placed[v]
+                sim.placed(p)
             } else {
-                sim.positions()[v]
+                sim.points()[p as usize]
             }
             .into()
         };
@@ -144,9 +162,9 @@ impl Driver {
                 .pins
                 .iter()
                 .zip(pins)
-                .map(|(pin, vertices)| {
-                    let place = |v| pin.target.unwrap_or_else(|| home(v));
-                    vertices.into_iter().map(|v| (v, place(v))).collect()
+                .map(|(pin, points)| {
+                    let place = |p| pin.target.unwrap_or_else(|| home(p));
+                    points.into_iter().map(|p| (p, place(p))).collect()
                 })
                 .collect(),
             held: scene
@@ -188,24 +206,24 @@ impl Driver {
                     .filter(|&v| !self.holds(v))
                     .collect();
                 if !free.is_empty() {
-                    sim.unpin(&free).map_err(place)?;
+                    sim.unpin_points(&free).map_err(place)?;
                 }
             } else if pin.motion.len() > 1 {
-                let vertices: Vec<u32> = self.pins[i].iter().map(|p| p.0).collect();
+                let points: Vec<u32> = self.pins[i].iter().map(|p| p.0).collect();
                 let offset = motion::offset(&pin.motion, time).into();
                 let targets: Vec<[f64; 3]> =
                     self.pins[i].iter().map(|p| add(p.1, offset)).collect();
-                sim.pin(&vertices, Some(&targets)).map_err(place)?;
+                sim.pin_points(&points, Some(&targets)).map_err(place)?;
             }
         }
         Ok(())
     }
 
-    /// Whether a pin that is still on holds a vertex.
-    fn holds(&self, vertex: u32) -> bool {
+    /// Whether a pin that is still on holds a point.
+    fn holds(&self, point: u32) -> bool {
         self.pins
             .iter()
             .zip(&self.held)
-            .any(|(pin, &held)| held && pin.iter().any(|p| p.0 == vertex))
+            .any(|(pin, &held)| held && pin.iter().any(|p| p.0 == point))
     }
 }

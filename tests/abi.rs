@@ -211,6 +211,7 @@ fn both_sides_see_the_same_sizes() {
         toile_step_report,
         toile_energies,
         toile_system_info,
+        toile_yarn_changes,
         toile_view_f64
     );
     assert_eq!(

@@ -52,6 +52,7 @@ fn case() -> (Cloth, Case) {
         time: 0.0,
         positions: x.clone(),
         velocities: vec![Vec3::zeros(); x.len()],
+        topology: Default::default(),
         u: Vec::new(),
         u_rates: Vec::new(),
         sliding: Vec::new(),

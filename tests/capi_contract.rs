@@ -24,6 +24,7 @@ fn with_sim(sim: *mut toile_sim) -> Vec<(&'static str, toile_status)> {
     let mut report = filled(toile_step_report_init);
     let mut energies = filled(toile_energies_init);
     let mut info = filled(toile_system_info_init);
+    let mut changes = filled(toile_yarn_changes_init);
     let sphere = sphere(0.1);
     let garment = &mut ptr::null_mut();
     let zero = [0.0; 12];
@@ -68,6 +69,11 @@ fn with_sim(sim: *mut toile_sim) -> Vec<(&'static str, toile_status)> {
         toile_sim_yarn_tensions(ptr::null_mut(), 0, n),
         toile_sim_yarn_compressions(ptr::null_mut(), 0, n),
         toile_sim_yarn_slips(ptr::null_mut(), 0, n),
+        toile_sim_yarn_active(ptr::null_mut(), 0, n),
+        toile_sim_yarn_forces(ptr::null_mut(), 0, n),
+        toile_sim_yarn_changes(&mut changes),
+        toile_sim_locate_yarn_node(0, zero.as_ptr(), &mut count),
+        toile_sim_yarn_end(0, 0, &mut count),
         toile_sim_body_positions(0, ptr::null_mut(), 0, n),
         toile_sim_body_triangles(0, ptr::null_mut(), 0, n),
         toile_sim_energies(&mut energies),
@@ -333,7 +339,11 @@ fn arrays_are_copied_out_in_two_calls_or_not_at_all() {
     ] {
         check(&sim, call, 0xdead_beef);
     }
-    for call in [toile_sim_vertex_active, toile_sim_save] {
+    for call in [
+        toile_sim_vertex_active,
+        toile_sim_yarn_active,
+        toile_sim_save,
+    ] {
         check(&sim, call, 0xcc_u8);
     }
     check(&sim, toile_sim_backend, 0x55 as c_char);

@@ -122,6 +122,8 @@ fn a_panel_of_yarns_is_read_held_and_moved() {
         let pressed = array::<f64>(|o, c, k| toile_sim_yarn_compressions(sim.0, o, c, k));
         assert_eq!((slips.len(), tensions.len()), (u.len(), u.len()));
         assert_eq!(pressed.len(), count);
+        let active = array::<u8>(|o, c, k| toile_sim_yarn_active(sim.0, o, c, k));
+        assert_eq!(active, vec![1; count]);
         assert!(slips.iter().any(|s| *s != 0.0));
         assert!(tensions.iter().any(|t| *t > 0.0));
         assert!(pressed.iter().all(|l| *l >= 0.0));

@@ -83,7 +83,10 @@ fn run_writes_a_complete_summary_models_pattern_and_picture() {
         "vertices",
         "triangles",
         "yarn_nodes",
+        "full_nodes",
         "hybrid_nodes",
+        "carried_nodes",
+        "active_triangles",
         "unknowns",
         "peak_memory_bytes",
         "steps",
@@ -465,4 +468,111 @@ fn yarns_are_laid_counted_and_drawn() {
     ]);
     assert_eq!(code(&output), 1);
     assert!(text(&output.stderr).contains("two radii"));
+}
+
+#[test]
+fn a_body_stands_where_the_command_line_says() {
+    let folder = Folder::new("offset");
+    let mut scene = scene();
+    scene["bodies"] = json!([]);
+    let file = folder.write("scene.json", &scene.to_string());
+    let body = folder.0.join("body.obj");
+    assert_eq!(code(&toile(&["mannequin", path(&body)])), 0);
+    let run = |offset: &[&str]| {
+        let out = folder.0.join("out");
+        let fixed = ["run", path(&file), "--out", path(&out), "--quiet"];
+        let body = ["--body", path(&body), "--set", "run.duration=0.01"];
+        let output = toile(&[&fixed[..], &body, &["--set", "gravity.y=0"], offset].concat());
+        (code(&output), out)
+    };
+    let gap = |offset: &[&str]| {
+        let (code, out) = run(offset);
+        assert_eq!(code, 0);
+        let text = std::fs::read_to_string(out.join("summary.json")).expect("summary");
+        let summary: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+        summary["min_gap"].as_f64().expect("a gap")
+    };
+    let (near, far) = (
+        gap(&["--body-offset", "0,-10,0"]),
+        gap(&["--body-offset", "0,-13,0"]),
+    );
+    assert!((far - near - 3.0).abs() < 0.05, "{near} {far}");
+    for wrong in ["1,2", "1,2,nan", "up"] {
+        assert_eq!(run(&["--body-offset", wrong]).0, 2, "{wrong}");
+    }
+}
+
+#[test]
+fn every_problem_of_a_garment_is_told() {
+    let folder = Folder::new("problems");
+    let mut scene = scene();
+    let mut panels = scene["garment"]["panels"]
+        .as_array()
+        .expect("panels")
+        .clone();
+    let mut second = panels[0].clone();
+    second["name"] = json!("second");
+    second["edge_length"] = json!(-1.0);
+    panels[0]["vertices"][0] = json!([1e9, 0.0]);
+    panels.push(second);
+    scene["garment"]["panels"] = json!(panels);
+    let file = folder.write("scene.json", &scene.to_string());
+    let output = toile(&["check", path(&file)]);
+    assert_eq!(code(&output), 1);
+    let all = text(&output.stdout);
+    assert!(
+        all.contains("second") && all.contains("1000000000"),
+        "{all}"
+    );
+    assert!(all.contains("2 problems"), "{all}");
+}
+
+#[test]
+fn a_clockwise_outline_is_noted() {
+    let folder = Folder::new("clockwise");
+    let mut scene = scene();
+    let panel = &mut scene["garment"]["panels"][0];
+    let mut edges = panel["edges"].as_array().expect("edges").clone();
+    edges.reverse();
+    for edge in &mut edges {
+        edge.as_array_mut().expect("ends").reverse();
+    }
+    panel["edges"] = json!(edges);
+    scene.as_object_mut().expect("object").remove("pins");
+    let file = folder.write("scene.json", &scene.to_string());
+    let output = toile(&["check", path(&file)]);
+    let all = text(&output.stdout);
+    assert!(all.contains("clockwise"), "{all}");
+}
+
+/// `report` leaves its three files, and lists what it could not compare.
+#[test]
+fn report_compares_models_and_leaves_its_files() {
+    let folder = Folder::new("report");
+    let square = json!([[0, 0], [0.02, 0], [0.02, 0.02], [0, 0.02]]);
+    let scene = json!({
+        "toile": 1,
+        "name": "swatch",
+        "garment": {
+            "toile_garment": 1,
+            "name": "g",
+            "edge_length": 0.005,
+            "panels": [{"name": "p", "fabric": "y", "vertices": square,
+                "edges": [[0, 1], [1, 2], [2, 3], [3, 0]]}],
+            "fabrics": [{"name": "y", "yarns": {"weave": "plain", "warp_pitch": 0.002, "radius": 0.0005}}],
+            "blend_regions": [{"panel": "p", "polygon": [[-1, -1], [1, -1], [1, 0.011], [-1, 0.011]]}],
+        },
+        "pins": [{"panel": "p", "edge": 2}],
+        "numbers": {"yarn.sliding": 0, "solver.drape.max_steps": 1},
+    });
+    let file = folder.write("scene.json", &scene.to_string());
+    let out = folder.0.join("out");
+    let done = toile(&["report", path(&file), "--out", path(&out)]);
+    assert_eq!(code(&done), 0, "{}", text(&done.stderr));
+    assert!(text(&done.stdout).contains("mixed, regions x 1"));
+    let report: Value =
+        serde_json::from_slice(&std::fs::read(out.join("report.json")).unwrap()).unwrap();
+    assert_eq!(report["models"].as_array().unwrap().len(), 7);
+    assert!(text(&std::fs::read(out.join("report.csv")).unwrap()).starts_with("name,kind"));
+    assert!(text(&std::fs::read(out.join("report.html")).unwrap()).contains("swatch"));
 }

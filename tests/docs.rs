@@ -3,12 +3,13 @@
 
 use std::path::Path;
 
-const PAGES: [&str; 6] = [
+const PAGES: [&str; 7] = [
     "README.md",
     "ARCHITECTURE.md",
     "CONTRIBUTING.md",
     "CHANGELOG.md",
     "docs/fmi.md",
+    "docs/mixed.md",
     "docs/yarns.md",
 ];
 /// What the build or a run makes.

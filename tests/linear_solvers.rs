@@ -279,6 +279,28 @@ fn cuthill_mckee_is_a_permutation_of_small_bandwidth() {
     assert!(case.priorities.contains(&0) && case.priorities.contains(&1));
 }
 
+/// Where incomplete factors take many iterations, kept factors follow until the host's next call.
+#[test]
+fn slow_incomplete_factors_are_left() {
+    let case = sewn_cloth(1_600, 4, 1e-2);
+    let b = forces(case.matrix.n(), 1);
+    let mut x = vec![Vec3::zeros(); b.len()];
+    let mut automatic = solver(0, 2_000, Some(&case.priorities), &Workers::default());
+    for _ in 0..2 {
+        automatic.prepare(&case.matrix).expect("prepares");
+        assert_eq!(automatic.name(), "cg_ic0");
+        let quick = automatic.solve(&case.matrix, &b, &mut x, 1e-1);
+        assert!(quick.expect("solves") <= 50);
+        automatic.prepare(&case.matrix).expect("prepares");
+        assert_eq!(automatic.name(), "cg_ic0");
+        let slow = automatic.solve(&case.matrix, &b, &mut x, 1e-12);
+        assert!(slow.expect("solves") > 50);
+        automatic.prepare(&case.matrix).expect("prepares");
+        assert_eq!(automatic.name(), "cg_cholesky");
+        automatic.forget();
+    }
+}
+
 /// Numbers in the settings choose what they say; the automatic choice follows the stiffness.
 #[test]
 fn the_choice_follows_its_number() {

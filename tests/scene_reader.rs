@@ -76,7 +76,8 @@ fn full(folder: &Folder) -> Value {
         "pins": [
             {"panel": "square", "uv": [0, 1], "target": [0, 1, 0], "until": 2.5},
             {"panel": 0, "edge": 2, "motion": [{"time": 0, "offset": [0, 0, 0]},
-                                               {"time": 1, "offset": [0, 0, 0.1]}]}
+                                               {"time": 1, "offset": [0, 0, 0.1]}]},
+            {"yarn": 3, "end": "last"}
         ],
         "probes": [{"name": "corner", "panel": "square", "uv": [1, 1]},
                    {"name": "hem", "panel": 0, "edge": 1}],

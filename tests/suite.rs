@@ -58,6 +58,14 @@ mod layering;
 mod licences;
 #[path = "linear_solvers.rs"]
 mod linear_solvers;
+#[path = "mixed_hard.rs"]
+mod mixed_hard;
+#[path = "mixed_patches.rs"]
+mod mixed_patches;
+#[path = "mixed_pucker.rs"]
+mod mixed_pucker;
+#[path = "mixed_riders.rs"]
+mod mixed_riders;
 #[path = "pattern_bytes.rs"]
 mod pattern_bytes;
 #[path = "pattern_check.rs"]
@@ -80,6 +88,8 @@ mod real_garments;
 mod reference_bending;
 #[path = "reference_membrane.rs"]
 mod reference_membrane;
+#[path = "report.rs"]
+mod report;
 #[path = "rest.rs"]
 mod rest;
 #[path = "scene_motion.rs"]
@@ -108,6 +118,8 @@ mod tri_real;
 mod yarn_charts;
 #[path = "yarn_contacts.rs"]
 mod yarn_contacts;
+#[path = "yarn_fabrics.rs"]
+mod yarn_fabrics;
 #[path = "yarn_friction.rs"]
 mod yarn_friction;
 #[path = "yarn_garments.rs"]
@@ -116,11 +128,15 @@ mod yarn_garments;
 mod yarn_knit;
 #[path = "yarn_laws.rs"]
 mod yarn_laws;
+#[path = "yarn_robust.rs"]
+mod yarn_robust;
 #[path = "yarn_sims.rs"]
 mod yarn_sims;
 #[path = "yarn_terms_fd.rs"]
 mod yarn_terms_fd;
 #[path = "yarn_terms_symmetry.rs"]
 mod yarn_terms_symmetry;
+#[path = "yarn_topology.rs"]
+mod yarn_topology;
 #[path = "yarn_weave.rs"]
 mod yarn_weave;

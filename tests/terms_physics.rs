@@ -45,6 +45,7 @@ fn state(positions: &[Vec3]) -> State {
         time: 0.0,
         positions: positions.to_vec(),
         velocities: vec![Vec3::zeros(); positions.len()],
+        topology: Default::default(),
         u: Vec::new(),
         u_rates: Vec::new(),
         sliding: Vec::new(),

@@ -31,6 +31,8 @@ from fmpy.fmi2 import FMU2Slave
 from fmpy.fmi3 import FMU3Slave
 
 ROOT = Path(__file__).resolve().parents[2]
+# the package beside this file, installed or not
+sys.path.insert(0, str(ROOT / "python"))
 AXES = (1, 2, 3)
 START = 0.75  # height of the ball's centre [m]
 END = 0.5  # [s]

@@ -22,6 +22,7 @@ from __future__ import annotations
 import argparse
 import csv
 import json
+import os
 import subprocess
 import sys
 import tempfile
@@ -29,9 +30,15 @@ from pathlib import Path
 
 import numpy as np
 
-from toile.fmu import sweep
-
 ROOT = Path(__file__).resolve().parents[2]
+# the package beside this file, installed or not, for the workers as well
+sys.path.insert(0, str(ROOT / "python"))
+os.environ["PYTHONPATH"] = os.pathsep.join(
+    [str(ROOT / "python"), *filter(None, [os.environ.get("PYTHONPATH")])]
+)
+
+from toile.fmu import sweep  # noqa: E402
+
 CLOTH, TABLE = 0.15, 0.09  # radii [m]
 SIDES, HELD = 48, 24
 DENSITY, EDGE = 0.15, 0.015  # [kg/m^2], [m]

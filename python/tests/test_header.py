@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+import toile
 from toile import _ffi
 
 HEADER = Path(__file__).resolve().parents[2] / "include" / "toile.h"
@@ -83,3 +84,27 @@ def test_functions_have_the_signatures_of_the_header(header):
         assert len(listed) == len(arguments), name
         for declaration, kind in zip(listed, arguments):
             assert matches(declaration, kind), (name, declaration, kind)
+
+
+#: Functions of the header that Python reaches by another way.
+OTHERWISE = {
+    "toile_sim_positions": "Sim.positions",
+    "toile_sim_velocities": "Sim.velocities",
+    "toile_sim_positions_view": "Sim.positions",
+    "toile_sim_velocities_view": "Sim.velocities",
+    "toile_sim_vertex_count": "Sim.info",
+    "toile_sim_triangle_count": "Sim.info",
+}
+
+
+def test_every_function_of_the_header_has_its_way(header):
+    found = set(re.findall(r"\b(toile_\w+)\(", header))
+    # the defaults of structs: `_ffi.new` calls these by name
+    found -= {name + "_init" for name in _ffi.STRUCTS}
+    package = Path(_ffi.__file__).parent
+    code = "".join(p.read_text() for p in package.glob("*.py"))
+    called = set(re.findall(r"\blib\.(toile_\w+)", code))
+    assert found - called == set(OTHERWISE)
+    for way in OTHERWISE.values():
+        kind, name = way.split(".")
+        assert hasattr(getattr(toile, kind), name), way

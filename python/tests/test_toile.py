@@ -2,6 +2,8 @@
 
 import json
 import os
+import subprocess
+import sys
 import threading
 from pathlib import Path
 
@@ -10,6 +12,7 @@ import pytest
 
 import toile
 from square import SQUARE, square
+from weave import pull, weave
 
 def test_arrays_have_the_shapes_and_values_that_were_asked_for():
     with toile.Sim(square()) as sim:
@@ -238,3 +241,60 @@ def test_yarns_of_a_panel_are_read_and_held():
             sim.unpin_yarn_nodes(held)
         with pytest.raises(ValueError):
             sim.pin_yarn_nodes(held, target[:1])
+
+
+LAWN = '{"name": "lawn", "density": 0.08, "membrane": {"warp": 200, "weft": 200, "shear": 40}}'
+
+
+def test_garments_are_edited_and_read():
+    garment = square()
+    assert garment.seam_count == 0 and garment.warnings == []
+    lawn = garment.add_fabric(LAWN)
+    garment.set_panel_fabric(0, lawn)
+    assert garment.panel_index(garment.panel_names[0]) == 0
+    with pytest.raises(toile.ToileError, match="gone"):
+        garment.panel_index("gone")
+    garment.set_blend_region(0, [[0, 0], [0.1, 0], [0.1, 0.1]], rings=3)
+    assert json.loads(garment.to_json())["blend_regions"][0]["rings"] == 3
+    garment.set_blend_region(0, np.empty((0, 2)))
+    assert not json.loads(garment.to_json()).get("blend_regions")
+    garment.set_blend_region(0, [[0, 0], [0.1, 0], [0.1, 0.1]])
+    garment.clear_blend_regions()
+    with toile.Sim(garment) as sim:
+        copy = sim.garment
+        assert copy.to_json() == garment.to_json()
+        assert sim.body_count == 0
+        sim.add_body(toile.Body.sphere(0.1))
+        assert sim.body_count == 1
+        sim.set_gravity((0, 1, 2))
+        sim.set_wind((3, 4, 5))
+        assert [sim[f"gravity.{k}"] for k in "xyz"] == [0, 1, 2]
+        assert [sim[f"wind.{k}"] for k in "xyz"] == [3, 4, 5]
+        sim.set_blend_region(0, np.empty((0, 2)))
+        with pytest.raises(toile.ToileError):
+            sim.set_blend_region(0, [[0, 0], [0.1, 0], [0.1, 0.1]])
+
+
+def test_a_weft_is_pulled_out_of_a_weave():
+    with weave() as sim:
+        assert sim.yarn_end(7, 1) == sim.locate_yarn_node(0, (0.005, 0.0025))
+        assert sim.yarn_changes == toile.YarnChanges(1, 0, 0, 0)
+        passages = len(sim.yarn_indices)
+        pulled = pull(sim, 70)
+        changes = sim.yarn_changes
+        assert changes.passages_gone == 5 and changes.epoch == 6
+        assert len(sim.yarn_indices) == len(sim.yarn_slips) == passages - 5
+        assert pulled[-1] < 0.2 * max(pulled)
+
+
+def test_a_half_pulled_weft_goes_on_bit_by_bit_in_another_process(tmp_path):
+    with weave() as sim:
+        pull(sim, 30)
+        assert 0 < sim.yarn_changes.passages_gone < 5
+        half = tmp_path / "half"
+        half.write_bytes(sim.save())
+        pull(sim, 20)
+        whole = sim.save()
+    program = Path(__file__).with_name("weave.py")
+    subprocess.run([sys.executable, program, half, "20"], check=True)
+    assert half.read_bytes() == whole

@@ -51,7 +51,7 @@ class Garment(_Owner):
 
     _free = lib.toile_garment_free
 
-    def __init__(self, name: str = "", edge_length: float = 0.02) -> None:
+    def __init__(self, name: str = "", edge_length: float = 0.015) -> None:
         """An empty garment; `edge_length` is the target edge length of its triangles [m]."""
         super().__init__()
         desc = _ffi.new("toile_garment_desc")
@@ -63,10 +63,15 @@ class Garment(_Owner):
     def from_json(cls, text: str, base_dir: Optional[PathLike] = None) -> Garment:
         """A garment object of toile or a GarmentCode specification; fabric files named in it are
         looked up in `base_dir`."""
+        data = _encode(text)
+        return cls._of(lib.toile_garment_from_json, data, len(data), _dir(base_dir))
+
+    @classmethod
+    def _of(cls, function: Any, *arguments: Any) -> Garment:
+        """The garment that a function of the library makes."""
         garment = cls.__new__(cls)
         _Owner.__init__(garment)
-        data = _encode(text)
-        garment._take(lib.toile_garment_from_json, data, len(data), _dir(base_dir))
+        garment._take(function, *arguments)
         return garment
 
     @classmethod
@@ -149,6 +154,30 @@ class Garment(_Owner):
         data = _encode(json)
         _check(lib.toile_garment_set_fabric(self.handle, data, len(data)))
 
+    def add_fabric(self, json: str) -> int:
+        """Adds a fabric for single panels (see :meth:`set_panel_fabric`) and returns its number."""
+        data = _encode(json)
+        out = ctypes.c_uint32()
+        _check(lib.toile_garment_add_fabric(self.handle, data, len(data), ctypes.byref(out)))
+        return out.value
+
+    def set_panel_fabric(self, panel: int, fabric: int) -> None:
+        """Makes one panel of the fabric with this number."""
+        _check(lib.toile_garment_set_panel_fabric(self.handle, panel, fabric))
+
+    def set_blend_region(self, panel: int, polygon: Array, rings: int = 2) -> None:
+        """Asks for every yarn inside a polygon of a panel, flat coordinates [m], shape (n, 2), with
+        `rings` hybrid rings around it. Takes the place of the panel's earlier region; no corners take
+        it away."""
+        uv = _f64(polygon, 2, "polygon")
+        _check(
+            lib.toile_garment_set_blend_region(self.handle, panel, _pointer(uv), len(uv), rings)
+        )
+
+    def clear_blend_regions(self) -> None:
+        """Takes every blend region away."""
+        _check(lib.toile_garment_clear_blend_region(self.handle))
+
     def check(self) -> None:
         """Raises :class:`DataError` naming panel, edge or seam if the garment cannot be."""
         _check(lib.toile_garment_check(self.handle))
@@ -159,6 +188,24 @@ class Garment(_Owner):
         count = ctypes.c_uint32()
         _check(lib.toile_garment_panel_count(self.handle, ctypes.byref(count)))
         return [_text(lib.toile_garment_panel_name, self.handle, i) for i in range(count.value)]
+
+    def panel_index(self, name: str) -> int:
+        """Number of the panel of this name."""
+        out = ctypes.c_uint32()
+        _check(lib.toile_garment_panel_index(self.handle, _encode(name), ctypes.byref(out)))
+        return out.value
+
+    @property
+    def seam_count(self) -> int:
+        """Number of seams."""
+        out = ctypes.c_uint32()
+        _check(lib.toile_garment_seam_count(self.handle, ctypes.byref(out)))
+        return out.value
+
+    @property
+    def warnings(self) -> list[str]:
+        """What the garment's and its fabrics' files contained that is not used."""
+        return _text(lib.toile_garment_warnings, self.handle).splitlines()
 
     def to_json(self) -> str:
         """toile's own JSON of the garment."""

@@ -70,6 +70,24 @@ class SystemInfo:
     factor_bytes: int
     #: Smallest triangle angle [rad].
     min_angle: float
+    #: Triangles that are simulated; yarns stand for the others.
+    active_triangles: int
+    #: Nodes of yarns that triangles carry.
+    carried_nodes: int
+
+
+@dataclass(frozen=True)
+class YarnChanges:
+    """What is not as the yarns were laid: contacts that yarns came out of."""
+
+    #: Grows whenever the others, or the arrays of nodes and passages, change; 1 as laid.
+    epoch: int
+    #: Passages of yarns through nodes that are gone.
+    passages_gone: int
+    #: Nodes that came out of others where yarns parted.
+    nodes_split: int
+    #: Nodes that no yarn passes any more.
+    nodes_left: int
 
 
 def _fields(value: Any) -> dict[str, Any]:

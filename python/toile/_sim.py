@@ -17,7 +17,7 @@ from ._garment import Garment
 from ._interrupt import _Interrupts
 from ._kept import _kept
 from ._owner import _Owner
-from ._report import Energies, Report, SystemInfo, _fields, _report
+from ._report import Energies, Report, SystemInfo, YarnChanges, _fields, _report
 
 #: ``progress(fraction, stage, residual)``; returning ``False`` stops the drape.
 ProgressCallback = Callable[[float, str, float], Optional[bool]]
@@ -102,6 +102,32 @@ class Sim(_Owner):
         x = _f64(positions, 3, "positions")
         _check(lib.toile_sim_set_body_vertices(self.handle, body, _pointer(x), len(x)))
 
+    @property
+    def body_count(self) -> int:
+        """Number of bodies."""
+        out = ctypes.c_uint32()
+        _check(lib.toile_sim_body_count(self.handle, ctypes.byref(out)))
+        return out.value
+
+    @property
+    def garment(self) -> Garment:
+        """A copy of the garment that the simulation was made of."""
+        return Garment._of(lib.toile_sim_garment, self.handle)
+
+    def set_gravity(self, gravity: Array) -> None:
+        """Acceleration of gravity [m/s^2], shape (3,)."""
+        _check(lib.toile_sim_set_gravity(self.handle, _vector(gravity, 3, "gravity")))
+
+    def set_wind(self, wind: Array) -> None:
+        """Velocity of the air [m/s], shape (3,)."""
+        _check(lib.toile_sim_set_wind(self.handle, _vector(wind, 3, "wind")))
+
+    def set_blend_region(self, panel: int, polygon: Array, rings: int = 2) -> None:
+        """Moves the region of a panel in which every yarn is simulated, as
+        :meth:`Garment.set_blend_region` says it; raises where the library cannot do that."""
+        uv = _f64(polygon, 2, "polygon")
+        _check(lib.toile_sim_set_blend_region(self.handle, panel, _pointer(uv), len(uv), rings))
+
     def body_wrench(self, body: int) -> tuple[np.ndarray, np.ndarray]:
         """Force [N] and torque about the body's origin [N m] of the cloth, world axes."""
         force, torque = (ctypes.c_double * 3)(), (ctypes.c_double * 3)()
@@ -142,6 +168,19 @@ class Sim(_Owner):
         """Lets nodes of yarns go."""
         n = _u32(nodes, "nodes").reshape(-1)
         _check(lib.toile_sim_unpin_yarn_nodes(self.handle, _pointer(n), len(n)))
+
+    def locate_yarn_node(self, panel: int, uv: Array) -> int:
+        """Node of a panel's yarns that was laid nearest to a flat point [m]."""
+        out = ctypes.c_uint32()
+        place = _vector(uv, 2, "uv")
+        _check(lib.toile_sim_locate_yarn_node(self.handle, panel, place, ctypes.byref(out)))
+        return out.value
+
+    def yarn_end(self, yarn: int, end: int) -> int:
+        """Node at the first (0) or the last (1) end of a yarn."""
+        out = ctypes.c_uint32()
+        _check(lib.toile_sim_yarn_end(self.handle, yarn, end, ctypes.byref(out)))
+        return out.value
 
     def locate(self, panel: int, uv: Array) -> int:
         """Vertex of a panel nearest to a flat point [m]."""
@@ -279,6 +318,24 @@ class Sim(_Owner):
     def yarn_slips(self) -> np.ndarray:
         """How far each yarn has slid since it was laid [m], shape (passages,)."""
         return _copy(lib.toile_sim_yarn_slips, np.float64, self.handle)
+
+    @property
+    def yarn_active(self) -> np.ndarray:
+        """Whether each node moves by itself, shape (nodes,); triangles carry the others."""
+        return _copy(lib.toile_sim_yarn_active, np.uint8, self.handle).astype(bool)
+
+    @property
+    def yarn_forces(self) -> np.ndarray:
+        """Force on each node [N], shape (nodes, 3): on a held one what its holder bears."""
+        return _copy(lib.toile_sim_yarn_forces, np.float64, self.handle).reshape(-1, 3)
+
+    @property
+    def yarn_changes(self) -> YarnChanges:
+        """Contacts that yarns came out of since they were laid; the sizes of the yarns' arrays
+        change with its epoch."""
+        value = _ffi.new("toile_yarn_changes")
+        _check(lib.toile_sim_yarn_changes(self.handle, ctypes.byref(value)))
+        return YarnChanges(**_fields(value))
 
     @property
     def epoch(self) -> int:

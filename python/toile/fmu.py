@@ -15,6 +15,7 @@ import shutil
 import sys
 import tempfile
 import time
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -278,10 +279,24 @@ def sweep(
 
         # a fresh process for each worker: forking one that has threads is not safe
         context = multiprocessing.get_context("spawn")
-        with concurrent.futures.ProcessPoolExecutor(count, mp_context=context) as pool:
-            futures = {pool.submit(_one, data, *call): i for i, call in enumerate(calls)}
-            for future in concurrent.futures.as_completed(futures):
-                take(futures[future], future)
+
+        def together(indices: Sequence[int], last: bool) -> List[int]:
+            """Runs these; those that were lost with a worker, which ends the whole pool."""
+            lost = []
+            size = max(1, min(count, len(indices)))
+            with concurrent.futures.ProcessPoolExecutor(size, mp_context=context) as pool:
+                futures = {pool.submit(_one, data, *calls[i]): i for i in indices}
+                for future in concurrent.futures.as_completed(futures):
+                    if not last and isinstance(future.exception(), BrokenProcessPool):
+                        lost.append(futures[future])
+                    else:
+                        take(futures[future], future)
+            return lost
+
+        # a worker that was killed from outside need not be again; one that ends itself takes only
+        # its own run along when that is alone
+        for index in together(together(range(len(calls)), False), False):
+            together([index], True)
     else:
         from distributed import Client, LocalCluster, as_completed
 

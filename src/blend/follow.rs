@@ -36,21 +36,26 @@ pub struct Follow {
 }
 
 impl Follow {
-    /// Weights for the vertices of the panels in `panels`; `reach` is the length of an edge there [m].
+    /// Weights for the vertices in `follows`; `reach` is the length of an edge of a panel [m].
     pub fn new(
         mesh: &GarmentMesh,
         yarns: &YarnMesh,
-        panels: &[bool],
+        follows: &[bool],
         reach: impl Fn(u32) -> f64,
     ) -> Result<Self> {
         let mut out = Self {
             starts: vec![0],
             ..Self::default()
         };
-        for (panel, _) in panels.iter().enumerate().filter(|(_, wanted)| **wanted) {
+        for panel in 0..mesh.panel_starts.len() - 1 {
+            let vertices = mesh.panel_starts[panel]..mesh.panel_starts[panel + 1];
+            let mut vertices = vertices.filter(|v| follows[*v as usize]).peekable();
+            if vertices.peek().is_none() {
+                continue;
+            }
             let reach = reach(panel as u32);
             let buckets = Buckets::new(yarns, panel as u32, reach);
-            for vertex in mesh.panel_starts[panel]..mesh.panel_starts[panel + 1] {
+            for vertex in vertices {
                 let place = mesh.uv[vertex as usize];
                 if !out.carry(yarns, &buckets, &place, reach) {
                     return Err(Error::geometry(format!(

@@ -1,59 +1,82 @@
-//! Which panels the blend regions cover.
+//! Which triangles give way to yarns.
 //!
-//! A region covers a panel wholly if its polygon crosses the outline nowhere and no point of the
-//! outline is outside of it, within a millionth of the panel's size.
+//! A vertex is in the region if a polygon of its panel holds it, within a millionth of the panel's size; a
+//! triangle is if its three vertices are. So the region is as fine as the triangles: a polygon that holds none is
+//! refused, and between polygons that meet within a triangle there is no gap.
 
 use crate::error::{Error, Result};
 use crate::math::Vec2;
-use crate::pattern::outline::{Piece, inside, point_distance, polylines};
-use crate::pattern::{BlendRegion, Garment, Panel};
+use crate::pattern::outline::{Piece, inside, point_distance};
+use crate::pattern::{BlendRegion, Garment};
+use crate::tri::GarmentMesh;
 
-/// Turn of an outline between two points that are looked at [rad].
-const TURN: f64 = 0.1;
 /// Tolerance over the size of the panel.
 const TOLERANCE: f64 = 1e-6;
 
-/// For each panel whether it is simulated as yarns alone. A region that covers a panel in part, one
-/// whose fabric has no yarns, and a seam between yarns and triangles are refused.
-pub fn yarn_panels(garment: &Garment) -> Result<Vec<bool>> {
-    let mut wanted = vec![false; garment.panels.len()];
+/// For each triangle whether every yarn of it is simulated in its place. A region whose fabric has
+/// no yarns, one that holds no triangle, and hybrid rings where there is a border are refused.
+pub fn yarn_triangles(garment: &Garment, mesh: &GarmentMesh) -> Result<Vec<bool>> {
+    let mut within = vec![false; mesh.uv.len()];
     for (k, region) in garment.blend_regions.iter().enumerate() {
         let panel = &garment.panels[region.panel as usize];
-        let place = format!("blend_regions[{k}]");
         if garment.fabrics[panel.fabric].yarns.is_none() {
             return Err(Error::argument(format!(
                 "panel '{}' has fabric '{}', which has no yarns",
                 panel.name, garment.fabrics[panel.fabric].name
             ))
-            .at(place));
+            .at(place(k)));
         }
-        if !covers(region, panel)? {
-            return Err(Error::unsupported(format!(
-                "the region covers panel '{}' in part; this version simulates the yarns of whole panels",
-                panel.name
-            ))
-            .at(place));
-        }
-        wanted[region.panel as usize] = true;
-    }
-    for (k, seam) in garment.seams.iter().enumerate() {
-        let [a, b] = [seam.a.panel, seam.b.panel].map(|p| p as usize);
-        if wanted[a] != wanted[b] {
-            let (yarns, triangles) = if wanted[a] { (a, b) } else { (b, a) };
-            return Err(Error::unsupported(format!(
-                "panel '{}' of yarns is sewn to panel '{}' of triangles; this version sews yarns to \
-                 yarns: give both panels a region, or neither",
-                garment.panels[yarns].name, garment.panels[triangles].name
-            ))
-            .at(format!("seams[{k}]")));
+        let [low, high] = panel.bounds()?.unwrap_or([Vec2::zeros(); 2]);
+        let tolerance = TOLERANCE * (high - low).norm();
+        let polygon = sides(region);
+        for vertex in vertices(mesh, region) {
+            within[vertex] = within[vertex] || holds(&polygon, mesh.uv[vertex], tolerance);
         }
     }
-    Ok(wanted)
+    let full: Vec<bool> = mesh
+        .triangles
+        .iter()
+        .map(|t| t.iter().all(|v| within[*v as usize]))
+        .collect();
+    for (k, region) in garment.blend_regions.iter().enumerate() {
+        let panel = &garment.panels[region.panel as usize];
+        let of_panel = || {
+            let all = full.iter().zip(&mesh.triangle_panel);
+            all.filter(|(_, p)| **p == region.panel).map(|(f, _)| *f)
+        };
+        if !of_panel().any(|f| f) {
+            return Err(Error::argument(format!(
+                "the region holds no triangle of panel '{}', whose edges are {} m long: make it larger \
+                 or the triangles smaller",
+                panel.name,
+                garment.panel_edge_length(panel)
+            ))
+            .at(place(k)));
+        }
+        if region.rings > 0 && !of_panel().all(|f| f) {
+            return Err(Error::unsupported(format!(
+                "{} hybrid rings around the region of panel '{}'; this version joins yarns to \
+                 triangles directly, with 0 rings",
+                region.rings, panel.name
+            ))
+            .at(place(k)));
+        }
+    }
+    Ok(full)
 }
 
-fn covers(region: &BlendRegion, panel: &Panel) -> Result<bool> {
+fn place(region: usize) -> String {
+    format!("blend_regions[{region}]")
+}
+
+fn vertices(mesh: &GarmentMesh, region: &BlendRegion) -> std::ops::Range<usize> {
+    let panel = region.panel as usize;
+    mesh.panel_starts[panel] as usize..mesh.panel_starts[panel + 1] as usize
+}
+
+fn sides(region: &BlendRegion) -> Vec<Piece> {
     let n = region.polygon.len();
-    let polygon: Vec<Piece> = (0..n)
+    (0..n)
         .map(|i| Piece {
             a: region.polygon[i],
             b: region.polygon[(i + 1) % n],
@@ -61,22 +84,12 @@ fn covers(region: &BlendRegion, panel: &Panel) -> Result<bool> {
             ring: 0,
             next: (i + 1) % n,
         })
-        .collect();
-    let [low, high] = panel.bounds()?.unwrap_or([Vec2::zeros(); 2]);
-    let tolerance = TOLERANCE * (high - low).norm();
-    let within = |p: Vec2| {
-        inside(p, &polygon, 0)
-            || polygon
-                .iter()
-                .any(|piece| point_distance(p, piece.a, piece.b) <= tolerance)
-    };
-    let outline = polylines(&panel.segments()?, &panel.loops()[..1], TURN);
-    // a polygon that dips between two points of the outline has a corner inside of the panel
-    let dips = region.polygon.iter().any(|p| {
-        inside(*p, &outline, 0)
-            && outline
-                .iter()
-                .all(|piece| point_distance(*p, piece.a, piece.b) > tolerance)
-    });
-    Ok(!dips && outline.iter().all(|piece| within(piece.a)))
+        .collect()
+}
+
+fn holds(polygon: &[Piece], p: Vec2, tolerance: f64) -> bool {
+    inside(p, polygon, 0)
+        || polygon
+            .iter()
+            .any(|piece| point_distance(p, piece.a, piece.b) <= tolerance)
 }

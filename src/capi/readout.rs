@@ -320,6 +320,8 @@ pub unsafe extern "C" fn toile_sim_info(
             bytes: info.bytes as u64,
             factor_bytes: info.factor_bytes as u64,
             min_angle: info.min_angle,
+            active_triangles: info.active_triangles as u64,
+            carried_nodes: info.carried_nodes as u64,
         };
         desc::write(out, &info)
     })

@@ -110,8 +110,8 @@ unsafe fn give(sim: Sim, host: Host, out: *mut *mut toile_sim) -> Result<()> {
 /// Triangulates a garment and makes it ready to move; its vertices stand where the panels are
 /// placed. `desc` NULL takes the defaults. The garment may be changed or freed afterwards. Free the
 /// simulation with toile_sim_free. TOILE_E_GEOMETRY and TOILE_E_LIMIT name the panel;
-/// TOILE_E_UNSUPPORTED: a blend region covers a panel in part, or a panel of yarns is sewn to one of
-/// triangles.
+/// TOILE_E_ARGUMENT: a blend region holds no triangle, or its fabric has no yarns;
+/// TOILE_E_UNSUPPORTED: a region that covers a panel in part has hybrid rings.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn toile_sim_create(
     garment: *const toile_garment,
@@ -213,8 +213,8 @@ pub unsafe extern "C" fn toile_sim_set_body_sdf(
 
 /// Says where a body is to be at the end of the next step: position [m] of its origin and rotation
 /// x, y, z, w. The cloth feels the velocity that follows. Before the first step or drape it is a
-/// placement: the body stands there at once and has no velocity. A drape takes the body to its pose
-/// before it begins.
+/// placement: the body stands there at once and has no velocity. A drape takes the body to its pose, and
+/// cloth that rests on it goes along.
 ///
 /// cbindgen:ptrs-as-arrays=[[position; 3], [quaternion_xyzw; 4]]
 #[unsafe(no_mangle)]

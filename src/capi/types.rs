@@ -5,6 +5,7 @@ pub use super::log::{TOILE_LOG_ERROR, TOILE_LOG_INFO, TOILE_LOG_WARNING, toile_l
 use super::desc::{self, Versioned};
 use super::guard::entry;
 use super::status::toile_status;
+use crate::pattern::import::DEFAULT_EDGE_LENGTH;
 use std::ffi::{c_char, c_void};
 use std::ptr;
 
@@ -65,7 +66,7 @@ pub struct toile_garment_desc {
     pub struct_size: usize,
     /// Name for people, UTF-8; NULL for none.
     pub name: *const c_char,
-    /// Target edge length of the triangles [m]; a panel may have its own. Default 0.02.
+    /// Target edge length of the triangles [m]; a panel may have its own. Default 0.015.
     pub edge_length: f64,
 }
 
@@ -308,6 +309,27 @@ pub struct toile_system_info {
     pub factor_bytes: u64,
     /// Smallest angle of a triangle [rad].
     pub min_angle: f64,
+    /// Triangles that are simulated; yarns stand for the others.
+    pub active_triangles: u64,
+    /// Nodes of yarns that triangles carry.
+    pub carried_nodes: u64,
+}
+
+/// What is not as the yarns were laid.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct toile_yarn_changes {
+    /// sizeof(toile_yarn_changes), set by the caller.
+    pub struct_size: usize,
+    /// Grows whenever any of these numbers, or the arrays that count nodes and passages, change. 0 without
+    /// yarns, 1 as laid.
+    pub epoch: u64,
+    /// Passages of yarns through nodes that are gone.
+    pub passages_gone: u64,
+    /// Nodes that came out of others where yarns parted.
+    pub nodes_split: u64,
+    /// Nodes that no yarn passes any more.
+    pub nodes_left: u64,
 }
 
 /// Numbers that lie in the library's memory. Valid until the next call on the same handle whose
@@ -345,7 +367,7 @@ macro_rules! versioned {
 }
 
 versioned! {
-    toile_garment_desc { name: ptr::null(), edge_length: 0.02 }
+    toile_garment_desc { name: ptr::null(), edge_length: DEFAULT_EDGE_LENGTH }
     toile_panel_desc {
         name: ptr::null(), vertices: ptr::null(), vertex_count: 0, edges: ptr::null(),
         edge_count: 0, edge_kinds: ptr::null(), edge_controls: ptr::null(),
@@ -381,8 +403,9 @@ versioned! {
     }
     toile_system_info {
         vertices: 0, triangles: 0, yarn_nodes: 0, unknowns: 0, bytes: 0, factor_bytes: 0,
-        min_angle: 0.0,
+        min_angle: 0.0, active_triangles: 0, carried_nodes: 0,
     }
+    toile_yarn_changes { epoch: 0, passages_gone: 0, nodes_split: 0, nodes_left: 0 }
     toile_view_f64 { data: ptr::null(), count: 0, components: 0, stride: 0, epoch: 0 }
 }
 
@@ -471,6 +494,15 @@ pub unsafe extern "C" fn toile_energies_init(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn toile_system_info_init(
     out: *mut toile_system_info,
+    struct_size: usize,
+) -> toile_status {
+    entry!({ desc::init(out, struct_size) })
+}
+
+/// Fills changes of yarns of `struct_size` bytes with zeros and its own size.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_yarn_changes_init(
+    out: *mut toile_yarn_changes,
     struct_size: usize,
 ) -> toile_status {
     entry!({ desc::init(out, struct_size) })

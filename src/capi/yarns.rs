@@ -1,14 +1,19 @@
 //! `toile_sim`: yarns, their nodes and what holds them.
 
+use super::desc;
 use super::guard::entry;
 use super::input::{self, LARGEST_COUNT};
 use super::output::{self, flat3};
 use super::sim::{SIMS, read, write};
 use super::status::toile_status;
-use super::types::toile_sim;
+use super::types::{toile_sim, toile_yarn_changes};
 
 /// World positions of the yarns' nodes [m], shape [node_count, 3]; sizes as in toile_sim_positions.
 /// Empty in a garment of triangles alone.
+///
+/// Nodes keep their numbers. Where yarns come out of contacts (toile_sim_yarn_changes tells) new nodes are counted
+/// on at the end, and nodes that no yarn passes any more stay where they were; the sizes of this and of the
+/// arrays below change then.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn toile_sim_yarn_nodes(
     sim: *const toile_sim,
@@ -122,8 +127,102 @@ pub unsafe extern "C" fn toile_sim_yarn_slips(
     })
 }
 
-/// Holds nodes of yarns, as toile_sim_pin holds vertices; yarns do not slide where they are held.
-/// TOILE_E_ARGUMENT names a node that does not exist.
+/// 1 for each node that moves by itself, 0 for one that the triangles around a region of yarns carry,
+/// shape [node_count]; sizes as in toile_sim_positions.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_yarn_active(
+    sim: *const toile_sim,
+    out: *mut u8,
+    capacity: usize,
+    needed: *mut usize,
+) -> toile_status {
+    entry!({
+        read(sim, |sim| {
+            let active: Vec<u8> = sim.active_yarn_nodes().into_iter().map(u8::from).collect();
+            output::copy(&active, out, capacity, needed)
+        })
+    })
+}
+
+/// Force on each node of the yarns and of what acts on them [N], shape [node_count, 3]: on a node that is held
+/// what its holder bears. Inertia is no part of it. Sizes as in toile_sim_positions.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_yarn_forces(
+    sim: *const toile_sim,
+    out: *mut f64,
+    capacity: usize,
+    needed: *mut usize,
+) -> toile_status {
+    entry!({
+        read(sim, |sim| {
+            output::copy(flat3(&sim.yarn_forces()?), out, capacity, needed)
+        })
+    })
+}
+
+/// What has changed since the yarns were laid: contacts that yarns came out of. `epoch` grows with every step, drape or
+/// restored state that changes it.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_yarn_changes(
+    sim: *const toile_sim,
+    out: *mut toile_yarn_changes,
+) -> toile_status {
+    entry!({
+        let object = SIMS.get(sim.addr())?;
+        desc::check_target(out, false)?;
+        let (epoch, changes) = object.read(|o| Ok((o.sim.yarn_epoch(), o.sim.yarn_changes())))?;
+        let changes = toile_yarn_changes {
+            struct_size: size_of::<toile_yarn_changes>(),
+            epoch,
+            passages_gone: changes.passages_gone as u64,
+            nodes_split: changes.nodes_split as u64,
+            nodes_left: changes.nodes_left as u64,
+        };
+        desc::write(out, &changes)
+    })
+}
+
+/// Node of a panel's yarns that was laid nearest to a point of the panel, in flat coordinates [m].
+/// TOILE_E_ARGUMENT: the panel is not simulated as yarns.
+///
+/// cbindgen:ptrs-as-arrays=[[uv; 2]]
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_locate_yarn_node(
+    sim: *const toile_sim,
+    panel: u32,
+    uv: *const f64,
+    out_node: *mut u32,
+) -> toile_status {
+    entry!({
+        let object = SIMS.get(sim.addr())?;
+        input::target(out_node, "out_node")?;
+        let uv = input::numbers::<2>(uv, "uv")?;
+        let node = object.read(|o| o.sim.locate_yarn_node(panel, uv))?;
+        output::put(out_node, node);
+        Ok(())
+    })
+}
+
+/// Node at the first (0) or the last (1) end of a yarn. TOILE_E_ARGUMENT names a yarn that does not exist.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_yarn_end(
+    sim: *const toile_sim,
+    yarn: u32,
+    end: u32,
+    out_node: *mut u32,
+) -> toile_status {
+    entry!({
+        let object = SIMS.get(sim.addr())?;
+        input::target(out_node, "out_node")?;
+        let node = object.read(|o| o.sim.yarn_end(yarn, end))?;
+        output::put(out_node, node);
+        Ok(())
+    })
+}
+
+/// Holds nodes of yarns, as toile_sim_pin holds vertices; yarns do not slide where they are held,
+/// and no contact comes off there. A yarn is held whole by all of its nodes. TOILE_E_ARGUMENT names a node that does
+/// not exist, or that no yarn passes any more.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn toile_sim_pin_yarn_nodes(
     sim: *mut toile_sim,

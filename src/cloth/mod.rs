@@ -1,6 +1,6 @@
 //! Rest data of the triangle part: the flat mesh, its fabrics, lumped areas and masses.
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::math::Vec2;
 use crate::pattern::{Fabric, Garment};
 use crate::tri::GarmentMesh;
@@ -18,6 +18,11 @@ pub struct Cloth {
     pub panel_grain: Vec<f64>,
     /// Rest area of each triangle [m^2].
     pub areas: Vec<f64>,
+    /// Mass per area of each triangle [kg/m^2].
+    pub densities: Vec<f64>,
+    /// Part of each triangle's membrane along weft and warp that is its own: 1, or less where yarns
+    /// lie over it.
+    pub share: Vec<[f64; 2]>,
     /// A third of the area of the triangles around each vertex [m^2].
     pub vertex_areas: Vec<f64>,
     /// Lumped mass of each vertex [kg].
@@ -27,7 +32,18 @@ pub struct Cloth {
 impl Cloth {
     /// Rest data of a garment on one of its meshes. A triangle without area is refused.
     pub fn new(garment: &Garment, mesh: GarmentMesh) -> Result<Self> {
-        use crate::error::Error;
+        let count = mesh.triangles.len();
+        Self::covered(garment, mesh, &vec![[1.0; 2]; count], &vec![None; count])
+    }
+
+    /// Same where yarns cover some of the triangles: with the part of each membrane that is left, and
+    /// the mass of the triangles that do not have their fabric's [kg].
+    pub fn covered(
+        garment: &Garment,
+        mesh: GarmentMesh,
+        share: &[[f64; 2]],
+        covered_masses: &[Option<f64>],
+    ) -> Result<Self> {
         for fabric in &garment.fabrics {
             fabric.check()?;
         }
@@ -36,6 +52,8 @@ impl Cloth {
             panel_fabric: garment.panels.iter().map(|p| p.fabric).collect(),
             panel_grain: garment.panels.iter().map(|p| p.grain).collect(),
             areas: Vec::with_capacity(mesh.triangles.len()),
+            densities: Vec::with_capacity(mesh.triangles.len()),
+            share: share.to_vec(),
             vertex_areas: vec![0.0; mesh.uv.len()],
             masses: vec![0.0; mesh.uv.len()],
             mesh,
@@ -47,12 +65,14 @@ impl Cloth {
                 return Err(Error::geometry(format!("triangle {t} has area {area}")));
             }
             let panel = cloth.mesh.triangle_panel[t] as usize;
-            let density = cloth.fabrics[cloth.panel_fabric[panel]].density;
+            let own = cloth.fabrics[cloth.panel_fabric[panel]].density;
+            let density = covered_masses[t].map_or(own, |mass| mass / area);
             for &v in tri {
                 cloth.vertex_areas[v as usize] += area / 3.0;
                 cloth.masses[v as usize] += area * density / 3.0;
             }
             cloth.areas.push(area);
+            cloth.densities.push(density);
         }
         Ok(cloth)
     }

@@ -16,8 +16,19 @@ pub struct Overrides {
     pub edge_length: Option<f64>,
     /// Numbers by dotted name.
     pub numbers: Vec<(String, f64)>,
-    /// A closed mesh to add to the bodies, and the factor to metres.
-    pub body: Option<(PathBuf, f64)>,
+    /// A body to add.
+    pub body: Option<AddedBody>,
+}
+
+/// A closed mesh that a command line adds to the bodies.
+#[derive(Clone, Debug)]
+pub struct AddedBody {
+    /// OBJ file.
+    pub file: PathBuf,
+    /// Factor from its coordinates to metres.
+    pub scale: f64,
+    /// Where its origin stands [m].
+    pub position: [f64; 3],
 }
 
 /// A scene as it goes into an archive.
@@ -164,11 +175,15 @@ impl Collected {
         if let Some(length) = overrides.edge_length {
             self.set("edge_length", json!(length))?;
         }
-        if let Some((path, scale)) = &overrides.body {
+        if let Some(added) = &overrides.body {
+            let path = &added.file;
             let bytes = files::read(path)?;
             let name = path.file_stem().unwrap_or_default().to_string_lossy();
             let file = self.keep(&plain("bodies", path), bytes);
-            let body = json!({"name": name, "shape": "mesh", "file": file, "scale": scale});
+            let body = json!({
+                "name": name, "shape": "mesh", "file": file, "scale": added.scale,
+                "pose": {"position": added.position},
+            });
             let bodies = self.root()?.entry("bodies").or_insert_with(|| json!([]));
             bodies
                 .as_array_mut()

@@ -21,8 +21,8 @@ pub(super) struct Description<'a> {
     pub(super) variables: &'a [Variable],
 }
 
-/// Stop time where the scene names no duration [s]: short enough to try an FMU out.
-const STOP_TIME: f64 = 0.1;
+/// Stop time where the scene names no duration [s].
+const STOP_TIME: f64 = 0.25;
 
 fn truth(yes: bool) -> String {
     yes.to_string()

@@ -179,7 +179,7 @@ fn set_pins(model: &Model, inputs: &Inputs<'_>, sim: &mut Sim, time: f64) -> Res
             .iter()
             .map(|v| (Vec3::from(v.1) + offset).into())
             .collect();
-        sim.pin(&indices, Some(&targets))
+        sim.pin_points(&indices, Some(&targets))
             .map_err(|e| e.at(format!("pin[{}]", p + 1)))?;
         free.retain(|v| !indices.contains(v));
     }
@@ -189,5 +189,5 @@ fn set_pins(model: &Model, inputs: &Inputs<'_>, sim: &mut Sim, time: f64) -> Res
     if free.is_empty() {
         return Ok(());
     }
-    sim.unpin(&free)
+    sim.unpin_points(&free)
 }

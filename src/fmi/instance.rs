@@ -203,7 +203,7 @@ impl Instance {
                 "the simulation was built for changed parameters".into()
             });
         }
-        self.sim.roll_back(self.origin.clone());
+        self.sim.roll_back(self.origin.clone())?;
         self.tell_numbers()?;
         drive::place(&self.model, &self.values, &mut self.sim)?;
         self.results = Results::default();
@@ -334,7 +334,7 @@ impl Instance {
                 Ok(Status::Ok)
             }
             Err(e) => {
-                self.sim.roll_back(before);
+                self.sim.roll_back(before)?;
                 match e.status {
                     error::Status::NoAdmissibleState | error::Status::LinearSolve => {
                         Err(Fault::Discard(e))

@@ -5,7 +5,7 @@ use super::variables::{Quantity, Variable};
 use crate::error::{Error, Result};
 use crate::scene::{Initial, PinPlace, Scene, THREADS, files};
 use crate::sim::Sim;
-use crate::sim_scene::{self, along, pinned_vertices};
+use crate::sim_scene::{self, along, pinned_points};
 use crate::solve::settings::Settings;
 use std::path::Path;
 
@@ -117,6 +117,9 @@ impl Model {
                 match probe.place {
                     PinPlace::Point(uv) => sim.locate(probe.panel, uv).map(|v| vec![v]),
                     PinPlace::Edge(edge) => along(&sim, probe.panel, edge).map(<[u32]>::to_vec),
+                    PinPlace::Yarn { .. } => {
+                        Err(Error::unsupported("a yarn is pinned, not watched"))
+                    }
                 }
                 .map_err(|e| e.at(format!("probe '{}'", probe.name)))
             })
@@ -124,19 +127,23 @@ impl Model {
         let sizes = Sizes {
             vertices: sim.positions().len(),
             triangles: sim.triangles().len(),
+            nodes: sim.yarn_nodes().len(),
             probes: probes.iter().map(Vec::len).collect(),
         };
         let restored = scene.initial.snapshot.is_some();
-        let placed = &sim.mesh().placed;
         // a restored pin may have moved: its place is where the panel is placed
-        let home = |v: u32| {
-            let from = if restored { placed } else { sim.positions() };
-            from[v as usize].into()
+        let home = |p: u32| {
+            if restored {
+                sim.placed(p)
+            } else {
+                sim.points()[p as usize]
+            }
+            .into()
         };
         let pins = scene
             .pins
             .iter()
-            .zip(pinned_vertices(&sim, &scene)?)
+            .zip(pinned_points(&sim, &scene)?)
             .map(|(pin, vertices)| {
                 let place = |v| pin.target.unwrap_or_else(|| home(v));
                 vertices.into_iter().map(|v| (v, place(v))).collect()

@@ -63,7 +63,7 @@ impl Results {
     /// Force of the cloth on the holder of a pin [N].
     fn reaction(&mut self, model: &Model, sim: &Sim, pin: usize) -> Result<Vec3> {
         if self.forces.is_none() {
-            self.forces = Some(sim.forces()?);
+            self.forces = Some(sim.point_forces()?);
         }
         let forces = self.forces.as_deref().unwrap_or_default();
         let vertices = model.pins[pin].iter().filter(|v| sim.is_pinned(v.0));
@@ -95,6 +95,7 @@ impl Results {
                     EnergyPart::Bending => e.bending,
                     EnergyPart::Seam => e.seam,
                     EnergyPart::Contact => e.contact,
+                    EnergyPart::Yarn => e.yarn,
                     EnergyPart::Total => {
                         e.kinetic + e.gravity + e.membrane + e.bending + e.seam + e.contact + e.yarn
                     }
@@ -128,6 +129,13 @@ impl Results {
             }
             Quantity::Positions => {
                 flat(x, out);
+                return Ok(());
+            }
+            Quantity::NodeCount => count(sim.yarn_nodes().len() as u64),
+            Quantity::Nodes => {
+                let end = out.len() + variable.size();
+                flat(sim.yarn_nodes(), out);
+                out.resize(end, 0.0);
                 return Ok(());
             }
             Quantity::Velocities => {

@@ -19,6 +19,8 @@ pub struct Sizes {
     pub vertices: usize,
     /// Triangles.
     pub triangles: usize,
+    /// Nodes of yarns as they are laid: there will not be more.
+    pub nodes: usize,
     /// Vertices of each probe: 1 for a point.
     pub probes: Vec<usize>,
 }

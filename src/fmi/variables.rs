@@ -120,6 +120,8 @@ pub enum EnergyPart {
     Seam,
     /// With bodies and of cloth with itself.
     Contact,
+    /// Of yarns.
+    Yarn,
     /// All of the above.
     Total,
 }
@@ -203,6 +205,10 @@ pub enum Quantity {
     CurvePoints(usize),
     /// All positions.
     Positions,
+    /// Number of the yarns' nodes.
+    NodeCount,
+    /// Positions of the yarns' nodes, zeros after the last one.
+    Nodes,
     /// All velocities.
     Velocities,
     /// All normals.

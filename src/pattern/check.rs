@@ -5,7 +5,7 @@
 
 use super::curve::Curve;
 use super::outline::{Piece, first_contact, inside, polylines};
-use super::{Garment, Panel};
+use super::{BlendRegion, Garment, Panel, Seam};
 use crate::error::{Error, Result};
 use crate::math::Vec2;
 use std::collections::BTreeMap;
@@ -67,48 +67,61 @@ impl Garment {
         )))
     }
 
-    /// Checks that panels, seams, fabrics and blend regions are possible and consistent.
+    /// The first of [`Garment::problems`].
     pub fn check_geometry(&self) -> Result<()> {
+        self.problems().into_iter().next().map_or(Ok(()), Err)
+    }
+
+    /// Everything in panels, seams, fabrics and blend regions that is impossible or inconsistent.
+    pub fn problems(&self) -> Vec<Error> {
         if self.panels.is_empty() {
-            return Err(Error::geometry(format!(
-                "garment '{}' has no panels",
-                self.name
-            )));
+            let text = format!("garment '{}' has no panels", self.name);
+            return vec![Error::geometry(text)];
         }
         if self.fabrics.is_empty() {
-            return Err(Error::material(format!(
-                "garment '{}' has no fabrics",
-                self.name
-            )));
+            let text = format!("garment '{}' has no fabrics", self.name);
+            return vec![Error::material(text)];
         }
+        let mut problems = Vec::new();
+        let mut keep = |result: Result<()>| problems.extend(result.err());
         let mut names = BTreeMap::new();
         for (k, fabric) in self.fabrics.iter().enumerate() {
-            fabric.check()?;
-            if let Some(first) = names.insert(fabric.name.as_str(), k) {
-                return Err(Error::material(format!(
+            keep(fabric.check());
+            keep(match names.insert(fabric.name.as_str(), k) {
+                None => Ok(()),
+                Some(first) => Err(Error::material(format!(
                     "fabrics {first} and {k} are both named '{}'",
                     fabric.name
-                )));
-            }
+                ))),
+            });
         }
-        check_edge_length(&format!("garment '{}'", self.name), self.edge_length)?;
+        keep(check_edge_length(
+            &format!("garment '{}'", self.name),
+            self.edge_length,
+        ));
         let mut names = BTreeMap::new();
         for (k, panel) in self.panels.iter().enumerate() {
-            if let Some(first) = names.insert(panel.name.as_str(), k) {
-                return Err(Error::geometry(format!(
+            keep(match names.insert(panel.name.as_str(), k) {
+                None => Ok(()),
+                Some(first) => Err(Error::geometry(format!(
                     "panels {first} and {k} are both named '{}'",
                     panel.name
-                )));
-            }
+                ))),
+            });
         }
-        self.check_seams()?;
+        let mut used = BTreeMap::new();
+        for (k, seam) in self.seams.iter().enumerate() {
+            keep(self.check_seam(k, seam, &mut used));
+        }
         for (k, panel) in self.panels.iter().enumerate() {
-            let place = format!("panel '{}'", panel.name);
-            check_panel_numbers(panel, self.fabrics.len()).map_err(|e| e.at(&place))?;
-            let darts = self.darts_of(k);
-            check_panel_shape(panel, &darts).map_err(|e| e.at(&place))?;
+            let checked = check_panel_numbers(panel, self.fabrics.len())
+                .and_then(|()| check_panel_shape(panel, &self.darts_of(k)));
+            keep(checked.map_err(|e| e.at(format!("panel '{}'", panel.name))));
         }
-        self.check_blend_regions()
+        for (k, region) in self.blend_regions.iter().enumerate() {
+            keep(self.check_blend_region(k, region));
+        }
+        problems
     }
 
     /// `seam of each edge` for seams between two edges of this panel.
@@ -123,65 +136,66 @@ impl Garment {
         darts
     }
 
-    fn check_seams(&self) -> Result<()> {
-        let mut used = BTreeMap::new();
-        for (k, seam) in self.seams.iter().enumerate() {
-            for (side, edge) in [("a", seam.a), ("b", seam.b)] {
-                let Some(panel) = self.panels.get(edge.panel as usize) else {
-                    return Err(Error::geometry(format!(
-                        "seam {k} side {side}: panel {} of {}",
-                        edge.panel,
-                        self.panels.len()
-                    )));
-                };
-                let count = panel.edge_count();
-                if edge.edge as usize >= count {
-                    return Err(Error::geometry(format!(
-                        "seam {k} side {side}: edge {} of panel '{}', which has {count}",
-                        edge.edge, panel.name
-                    )));
-                }
-                if side == "b" && seam.a == seam.b {
-                    return Err(Error::geometry(format!(
-                        "seam {k} joins edge {} of panel '{}' to itself",
-                        edge.edge, panel.name
-                    )));
-                }
-                if let Some(first) = used.insert((edge.panel, edge.edge), k) {
-                    return Err(Error::geometry(format!(
-                        "edge {} of panel '{}' is used by seams {first} and {k}",
-                        edge.edge, panel.name
-                    )));
-                }
-            }
-            if !seam.rest_angle.is_finite() || seam.rest_angle.abs() > std::f64::consts::PI {
+    /// `used` holds the edges of the seams before this one.
+    fn check_seam(
+        &self,
+        k: usize,
+        seam: &Seam,
+        used: &mut BTreeMap<(u32, u32), usize>,
+    ) -> Result<()> {
+        for (side, edge) in [("a", seam.a), ("b", seam.b)] {
+            let Some(panel) = self.panels.get(edge.panel as usize) else {
                 return Err(Error::geometry(format!(
-                    "seam {k}: rest angle {} rad must lie within a half turn",
-                    seam.rest_angle
+                    "seam {k} side {side}: panel {} of {}",
+                    edge.panel,
+                    self.panels.len()
+                )));
+            };
+            let count = panel.edge_count();
+            if edge.edge as usize >= count {
+                return Err(Error::geometry(format!(
+                    "seam {k} side {side}: edge {} of panel '{}', which has {count}",
+                    edge.edge, panel.name
                 )));
             }
+            if side == "b" && seam.a == seam.b {
+                return Err(Error::geometry(format!(
+                    "seam {k} joins edge {} of panel '{}' to itself",
+                    edge.edge, panel.name
+                )));
+            }
+            if let Some(first) = used.insert((edge.panel, edge.edge), k) {
+                return Err(Error::geometry(format!(
+                    "edge {} of panel '{}' is used by seams {first} and {k}",
+                    edge.edge, panel.name
+                )));
+            }
+        }
+        if !seam.rest_angle.is_finite() || seam.rest_angle.abs() > std::f64::consts::PI {
+            return Err(Error::geometry(format!(
+                "seam {k}: rest angle {} rad must lie within a half turn",
+                seam.rest_angle
+            )));
         }
         Ok(())
     }
 
-    fn check_blend_regions(&self) -> Result<()> {
-        for (k, region) in self.blend_regions.iter().enumerate() {
-            if region.panel as usize >= self.panels.len() {
-                return Err(Error::geometry(format!(
-                    "blend region {k}: panel {} of {}",
-                    region.panel,
-                    self.panels.len()
-                )));
-            }
-            if region.polygon.len() < 3 {
-                return Err(Error::geometry(format!(
-                    "blend region {k}: {} corners, at least 3 needed",
-                    region.polygon.len()
-                )));
-            }
-            for (corner, p) in region.polygon.iter().enumerate() {
-                check_point(p).map_err(|e| e.at(format!("blend region {k} corner {corner}")))?;
-            }
+    fn check_blend_region(&self, k: usize, region: &BlendRegion) -> Result<()> {
+        if region.panel as usize >= self.panels.len() {
+            return Err(Error::geometry(format!(
+                "blend region {k}: panel {} of {}",
+                region.panel,
+                self.panels.len()
+            )));
+        }
+        if region.polygon.len() < 3 {
+            return Err(Error::geometry(format!(
+                "blend region {k}: {} corners, at least 3 needed",
+                region.polygon.len()
+            )));
+        }
+        for (corner, p) in region.polygon.iter().enumerate() {
+            check_point(p).map_err(|e| e.at(format!("blend region {k} corner {corner}")))?;
         }
         Ok(())
     }

@@ -7,7 +7,7 @@
 //! | mass per length | `0.5 * 1500 kg/m^3 * pi R^2` | cotton or wool fibres, half of the yarn's section |
 //! | stitch wrapping `k_w` | `B` | the published 1e-2 N rolls every knit up; `k_w = B` curls like cloth |
 //! | stitch length `k_l` | `Y pi R^2` | no published value; as stiff as the yarn itself |
-//! | least spacing `k_c` | `Y pi R^2 / (2 R pitch)` | as stiff as a yarn's diameter of yarn |
+//! | least spacing `k_c` | `0.1 Y pi R^2 / (2 R pitch)` | across a yarn is a tenth as stiff as along it |
 //! | loop height | 0.85 loop width | proportion of relaxed jersey |
 //!
 //! Loop width, radius, `Y`, `B`, friction and Rayleigh damping of the knitted presets are those of
@@ -22,8 +22,14 @@ use std::f64::consts::PI;
 const MAX_REPEAT: usize = 1000;
 /// Least loop height over loop width: below it, the contacts of neighbouring courses overlap.
 const LEAST_HEIGHT: f64 = 0.4;
+/// Stiffness of a yarn across over that along.
+const ACROSS: f64 = 0.1;
 /// Relative slack of the checks of spacing: numbers such as 0.003 and 4 * 0.00075 must agree.
 const SLACK: f64 = 1e-9;
+/// Thinnest and thickest yarn [m].
+const RADII: [f64; 2] = [1e-6, 0.1];
+/// Largest of any other number: a stiffness of diamond in Pa.
+const LARGEST: f64 = 1e12;
 
 /// Which yarn lies in front at the crossings of a weave's repeat.
 #[derive(Clone, Debug, PartialEq)]
@@ -229,7 +235,7 @@ impl YarnFabric {
         self.density = 0.5 * 1500.0 * section;
         self.wrapping = self.bending;
         self.stitch = self.young * section;
-        self.spacing = self.young * section / (2.0 * self.radius * a.min(b));
+        self.spacing = ACROSS * self.young * section / (2.0 * self.radius * a.min(b));
     }
 
     /// One of [`PRESETS`].
@@ -310,6 +316,17 @@ impl YarnFabric {
         for (key, value) in positive {
             if !value.is_finite() || value <= 0.0 {
                 return refuse(key, value, "finite and positive");
+            }
+        }
+        let [thin, thick] = RADII;
+        if !(thin..=thick).contains(&self.radius) {
+            let rule = format!("at least {thin} m, a fibre, and at most {thick} m, a hawser");
+            return refuse("radius", self.radius, &rule);
+        }
+        for (key, value) in positive.iter().chain(&not_negative) {
+            if *value > LARGEST {
+                let rule = format!("at most {LARGEST:e}: no material comes near it");
+                return refuse(key, *value, &rule);
             }
         }
         for (key, value) in not_negative {

@@ -9,8 +9,9 @@ pub mod motion;
 pub mod read;
 pub mod schema;
 
-use crate::body::Body;
+use crate::body::{Body, Pose};
 use crate::error::{Error, Result};
+use crate::math::Vec3;
 use crate::pattern::Garment;
 use crate::solve::settings::Settings;
 use crate::system::term::ContactSettings;
@@ -60,21 +61,41 @@ pub struct SceneBody {
     pub motion: BodyMotion,
 }
 
+impl SceneBody {
+    /// Moves the body, and where it goes over time, by an offset [m].
+    pub fn shift(&mut self, offset: Vec3) {
+        if self.motion.keys.is_empty() {
+            self.motion.keys = BodyMotion::fixed(Pose::default()).keys;
+        }
+        for key in &mut self.motion.keys {
+            key.pose.position += offset;
+        }
+    }
+}
+
 /// Which vertices a pin holds.
+/// Which points a pin holds: vertices, or nodes on a panel that is simulated as yarns.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PinPlace {
-    /// The vertex nearest to a flat point [m].
+    /// The point nearest to a flat point [m].
     Point([f64; 2]),
-    /// Every vertex on an edge of the panel, by edge number.
+    /// Every point on an edge of the panel, by edge number.
     Edge(u32),
+    /// Every node of a yarn, or one at its end: 0 where it begins, 1 where it ends.
+    Yarn {
+        /// The yarn.
+        yarn: u32,
+        /// Which end.
+        end: Option<u32>,
+    },
 }
 
 /// A pin of a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScenePin {
-    /// Panel index.
+    /// Panel index; of no meaning for a yarn.
     pub panel: u32,
-    /// Which vertices.
+    /// Which points.
     pub place: PinPlace,
     /// Where a single point is to be [m]; otherwise it is held where the panel is placed.
     pub target: Option<[f64; 3]>,

@@ -40,7 +40,7 @@ impl Scene {
                 Ok(reader.scene(&object))
             } else if object.has("toile_garment") || object.has("pattern") {
                 let (garment, notes) = garment_from_node(&root, base_dir)?;
-                reader.keep(garment.check());
+                reader.checked(&garment, "");
                 Ok(Some(Scene {
                     notes,
                     ..Scene::new(garment)
@@ -187,9 +187,18 @@ impl Reader<'_> {
             }),
         };
         let (garment, notes) = self.keep(read)?;
-        let checked = garment.check().map_err(|e| e.at(&node.path));
-        self.keep(checked);
+        self.checked(&garment, &node.path);
         Some((garment, notes))
+    }
+
+    /// Puts all problems of a garment aside, or that it would have too many vertices.
+    fn checked(&mut self, garment: &Garment, place: &str) {
+        let mut found = garment.problems();
+        if found.is_empty() {
+            found.extend(garment.check().err());
+        }
+        let placed = |e: Error| if place.is_empty() { e } else { e.at(place) };
+        self.problems.extend(found.into_iter().map(placed));
     }
 
     /// Fabrics by panel name; "*" is put on first, whatever its place.

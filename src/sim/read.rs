@@ -15,8 +15,12 @@ pub struct SystemInfo {
     pub vertices: usize,
     /// Triangles.
     pub triangles: usize,
+    /// Triangles that are simulated; yarns stand for the others.
+    pub active_triangles: usize,
     /// Nodes of yarns.
     pub yarn_nodes: usize,
+    /// Nodes among them that triangles carry.
+    pub carried_nodes: usize,
     /// Yarns.
     pub yarns: usize,
     /// Scalar unknowns.
@@ -130,7 +134,7 @@ impl Sim {
     /// vertex, pinned ones included. On a free vertex at rest it vanishes; on a held one it is what
     /// its holder bears, turned around.
     pub fn forces(&self) -> Result<Vec<Vec3>> {
-        let mut forces = self.engine().forces(&self.state)?;
+        let mut forces = self.point_forces()?;
         forces.truncate(self.mesh.uv.len());
         Ok(forces)
     }
@@ -162,7 +166,9 @@ impl Sim {
         SystemInfo {
             vertices: self.mesh.uv.len(),
             triangles: self.mesh.triangles.len(),
+            active_triangles: system.cloth.mesh.triangles.len(),
             yarn_nodes: self.yarn_nodes().len(),
+            carried_nodes: points.riders.list().len(),
             yarns: self.yarns().map_or(0, YarnMesh::yarn_count),
             unknowns: 3 * (moving - self.state.pins.len()) + system.unknowns.sliding(),
             terms: system

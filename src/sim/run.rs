@@ -66,7 +66,7 @@ impl Sim {
             )
         });
         drop(engine);
-        match done {
+        match done.and_then(|report| self.take_yarns().map(|()| report)) {
             Ok(report) => {
                 self.carry_vertices();
                 self.epoch += 1;
@@ -135,7 +135,7 @@ impl Sim {
             describe(&mut engine, &self.state, &relaxed.totals, ended, 0.0)
         });
         drop(engine);
-        match done {
+        match done.and_then(|report| self.take_yarns().map(|()| report)) {
             Ok(report) => {
                 self.end_placement();
                 self.carry_vertices();

@@ -1,4 +1,4 @@
-//! The world around the cloth: bodies and their motion, pins, positions, numbers.
+//! The world around the cloth: bodies and their motion, positions, numbers.
 
 use super::{ContactSettings, Sim, finite, finite_points};
 use crate::body::{Body, Pose};
@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::math::{Rotation, Vec3};
 use crate::system::bodies::check_index;
 use crate::system::snapshot::BodyOrigin;
-use crate::system::state::{Pin, State};
+use crate::system::state::State;
 use std::sync::PoisonError;
 
 impl Sim {
@@ -134,105 +134,6 @@ impl Sim {
         let b = check_index(body, self.bodies.len())?;
         let (force, torque) = self.engine().body_wrench(&self.state, b)?;
         Ok((force.into(), torque.into()))
-    }
-
-    /// Holds vertices; targets are reached at the end of the next step, `None` holds them where
-    /// they are. A vertex that is already pinned takes the new target.
-    pub fn pin(&mut self, vertices: &[u32], targets: Option<&[[f64; 3]]>) -> Result<()> {
-        self.check_vertices(vertices)?;
-        if let Some(targets) = targets {
-            if targets.len() != vertices.len() {
-                return Err(Error::argument(format!(
-                    "{} vertices but {} targets",
-                    vertices.len(),
-                    targets.len()
-                )));
-            }
-            for (v, t) in vertices.iter().zip(targets) {
-                finite(&format!("target of vertex {v}"), t)?;
-            }
-        }
-        for (k, &vertex) in vertices.iter().enumerate() {
-            self.hold(vertex, targets.map(|t| Vec3::from(t[k])));
-        }
-        self.epoch += 1;
-        Ok(())
-    }
-
-    /// Holds a point at a target, or where it is.
-    pub(super) fn hold(&mut self, point: u32, target: Option<Vec3>) {
-        let target = target.unwrap_or(self.state.positions[point as usize]);
-        let pins = &mut self.state.pins;
-        match pins.binary_search_by_key(&point, |p| p.vertex) {
-            Ok(i) => pins[i].target = target,
-            Err(i) => pins.insert(
-                i,
-                Pin {
-                    vertex: point,
-                    target,
-                },
-            ),
-        }
-    }
-
-    /// Lets vertices go; one that is not pinned is refused.
-    pub fn unpin(&mut self, vertices: &[u32]) -> Result<()> {
-        self.check_vertices(vertices)?;
-        let pinned = |v: &u32| {
-            self.state
-                .pins
-                .binary_search_by_key(v, |p| p.vertex)
-                .is_ok()
-        };
-        if let Some(v) = vertices.iter().find(|v| !pinned(v)) {
-            return Err(Error::argument(format!("vertex {v} is not pinned")));
-        }
-        self.state.pins.retain(|p| !vertices.contains(&p.vertex));
-        self.epoch += 1;
-        Ok(())
-    }
-
-    /// Whether a vertex is held.
-    pub fn is_pinned(&self, vertex: u32) -> bool {
-        let pins = &self.state.pins;
-        pins.binary_search_by_key(&vertex, |p| p.vertex).is_ok()
-    }
-
-    fn check_vertices(&self, vertices: &[u32]) -> Result<()> {
-        let n = self.mesh.uv.len();
-        if let Some(part) = &self.yarns
-            && let Some(v) = vertices.iter().find(|v| part.follows(**v))
-        {
-            return Err(Error::argument(format!(
-                "vertex {v} follows the yarns of its panel: hold nodes of yarns there"
-            )));
-        }
-        match vertices.iter().find(|&&v| v as usize >= n) {
-            Some(v) => Err(Error::argument(format!(
-                "vertex {v} does not exist; there are {n} vertices"
-            ))),
-            None => Ok(()),
-        }
-    }
-
-    /// Vertex of a panel nearest to a flat point [m].
-    pub fn locate(&self, panel: u32, uv: [f64; 2]) -> Result<u32> {
-        finite("uv", &uv)?;
-        let starts = &self.mesh.panel_starts;
-        let p = panel as usize;
-        if p + 1 >= starts.len() {
-            return Err(Error::argument(format!(
-                "panel {panel} does not exist; there are {}",
-                starts.len().saturating_sub(1)
-            )));
-        }
-        let point = crate::math::Vec2::from(uv);
-        (starts[p]..starts[p + 1])
-            .min_by(|a, b| {
-                let d = |v: &u32| (self.mesh.uv[*v as usize] - point).norm_squared();
-                d(a).total_cmp(&d(b))
-            })
-            .ok_or_else(|| Error::argument(format!("panel {panel} has no vertices")))
     }
 
     /// Sets positions [m] and velocities [m/s] of every vertex (`None`: zero); nodes of yarns go where

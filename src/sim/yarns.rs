@@ -1,9 +1,9 @@
 //! Yarns of a simulation: where they are, what holds them, and the vertices that follow them.
 
-use super::{Sim, finite};
-use crate::blend::Follow;
+use super::Sim;
 use crate::blend::embed::carried;
-use crate::blend::region::yarn_panels;
+use crate::blend::region::yarn_triangles;
+use crate::blend::{Direct, Follow, Riders};
 use crate::cloth::Cloth;
 use crate::error::{Error, Result};
 use crate::math::Vec3;
@@ -14,30 +14,40 @@ use crate::system::state::State;
 use crate::system::yarn::friction::loose;
 use crate::tri::GarmentMesh;
 use crate::yarn::layout::Layout;
-use crate::yarn::{Incidence, YarnMaterial, YarnMesh, Yarns, lay};
-use std::sync::Arc;
+use crate::yarn::{Incidence, Topology, YarnMaterial, YarnMesh, Yarns, lay};
+use std::sync::{Arc, PoisonError};
 
-/// Yarns and the vertices that they carry.
+/// Yarns, what they ride on, and the vertices that they carry.
 pub(super) struct YarnPart {
-    pub(super) yarns: Arc<Yarns>,
-    /// Panels that are simulated as yarns.
-    pub(super) panels: Vec<bool>,
+    /// Yarns as they pass their nodes now.
+    pub(super) now: Arc<Yarns>,
+    /// What is not as laid, in `now`.
+    topology: Topology,
+    /// Grows whenever `now` changes.
+    epoch: u64,
+    /// Nodes that ride on triangles.
+    pub(super) riders: Riders,
+    /// Triangles that the yarns stand for.
+    left_out: Vec<bool>,
+    share: Vec<[f64; 2]>,
+    masses: Vec<Option<f64>>,
     follow: Follow,
 }
 
 impl YarnPart {
-    /// Lays the yarns of the panels that the garment's blend regions cover.
+    /// Lays the yarns of the triangles that the garment's blend regions hold.
     pub(super) fn new(
         garment: &Garment,
         mesh: &GarmentMesh,
         settings: &Settings,
     ) -> Result<Option<Self>> {
-        let panels = yarn_panels(garment)?;
-        let wanted: Vec<u32> = (0..)
-            .zip(&panels)
-            .filter(|(_, w)| **w)
-            .map(|p| p.0)
+        let left_out = yarn_triangles(garment, mesh)?;
+        let mut wanted: Vec<u32> = (left_out.iter().zip(&mesh.triangle_panel))
+            .filter(|(left_out, _)| **left_out)
+            .map(|p| *p.1)
             .collect();
+        wanted.sort_unstable();
+        wanted.dedup();
         if wanted.is_empty() {
             return Ok(None);
         }
@@ -47,31 +57,50 @@ impl YarnPart {
             ..Layout::default()
         };
         let laid = lay(garment, &layout)?;
-        let materials = garment
+        let materials: Vec<YarnMaterial> = garment
             .fabrics
             .iter()
             .map(|f| f.yarns.as_ref().map(YarnMaterial::from).unwrap_or_default())
             .collect();
+        let direct = Direct::new(garment, mesh, &left_out, laid, &materials)?;
+        direct.yarns.check()?;
+        let mut follows = vec![false; mesh.uv.len()];
+        for gone in [true, false] {
+            let list = mesh.triangles.iter().zip(&left_out);
+            for (tri, _) in list.filter(|(_, left_out)| **left_out == gone) {
+                for v in tri {
+                    follows[*v as usize] = gone;
+                }
+            }
+        }
         let reach = |panel: u32| garment.panel_edge_length(&garment.panels[panel as usize]);
-        let follow = Follow::new(mesh, &laid, &panels, reach)?;
+        let follow = Follow::new(mesh, &direct.yarns, &follows, reach)?;
         Ok(Some(Self {
-            yarns: Arc::new(Yarns {
-                mesh: laid,
-                materials,
-            }),
-            panels,
+            now: Arc::new(Yarns::laid(direct.yarns, materials)),
+            topology: Topology::default(),
+            epoch: 1,
+            riders: direct.riders,
+            left_out,
+            share: direct.share,
+            masses: direct.masses,
             follow,
         }))
     }
 
     /// The cloth without the triangles that the yarns stand for.
     pub(super) fn rest_of(&self, garment: &Garment, mesh: &GarmentMesh) -> Result<Cloth> {
-        Cloth::new(garment, mesh.without_triangles_of(&self.panels))
+        let kept: Vec<usize> = (0..self.left_out.len())
+            .filter(|t| !self.left_out[*t])
+            .collect();
+        let share: Vec<[f64; 2]> = kept.iter().map(|t| self.share[*t]).collect();
+        let masses: Vec<_> = kept.iter().map(|t| self.masses[*t]).collect();
+        let mesh = mesh.without_triangles(&self.left_out);
+        Cloth::covered(garment, mesh, &share, &masses)
     }
 
     /// Adds the nodes, where the panels are placed, to a state of the vertices.
     pub(super) fn place(&self, garment: &Garment, state: &mut State) {
-        let mesh = &self.yarns.mesh;
+        let mesh = &self.now.mesh;
         for node in 0..mesh.uv.len() {
             let placement = &garment.panels[mesh.node_panel[node] as usize].placement;
             let (uv, lift) = (mesh.uv[node], mesh.lift[node]);
@@ -86,13 +115,15 @@ impl YarnPart {
         state.sliding = vec![false; mesh.incidences.len()];
         state.strands = loose(mesh, &state.u);
         state.yarn_normals = vec![Vec3::zeros(); mesh.uv.len()];
-        self.carry(state);
+        // vertices stay exactly where they are placed: a drape asks whether they do
+        self.riders.carry(&mut state.positions);
     }
 
-    /// Lets the vertices follow.
+    /// Lets riders ride and vertices follow.
     pub(super) fn carry(&self, state: &mut State) {
-        let first = state.positions.len() - self.yarns.mesh.uv.len();
+        let first = state.positions.len() - self.now.mesh.uv.len();
         for values in [&mut state.positions, &mut state.velocities] {
+            self.riders.carry(values);
             let (vertices, nodes) = values.split_at_mut(first);
             self.follow.apply(nodes, vertices);
         }
@@ -102,9 +133,10 @@ impl YarnPart {
     pub(super) fn take(&self, mesh: &GarmentMesh, state: &mut State) -> Result<()> {
         let first = mesh.uv.len();
         for values in [&mut state.positions, &mut state.velocities] {
-            let nodes = carried(mesh, &values[..first], &self.yarns.mesh)?;
+            let nodes = carried(mesh, &values[..first], &self.now.mesh)?;
             values.truncate(first);
             values.extend(nodes);
+            self.riders.carry(values);
         }
         Ok(())
     }
@@ -115,10 +147,21 @@ impl YarnPart {
     }
 }
 
+/// What is not as laid.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct YarnChanges {
+    /// Laid passages of yarns through nodes that are gone.
+    pub passages_gone: usize,
+    /// Nodes that came out of others, counted on after the laid ones.
+    pub nodes_split: usize,
+    /// Nodes that no yarn passes any more.
+    pub nodes_left: usize,
+}
+
 impl Sim {
-    /// The yarns as laid, if there are any.
+    /// The yarns as they pass their nodes now, if there are any; coordinates are those of the layout.
     pub fn yarns(&self) -> Option<&YarnMesh> {
-        self.yarns.as_ref().map(|part| &part.yarns.mesh)
+        self.yarns.as_ref().map(|part| &part.now.mesh)
     }
 
     /// Positions of the yarns' nodes [m].
@@ -154,28 +197,27 @@ impl Sim {
         let Some(part) = &self.yarns else {
             return Vec::new();
         };
-        let radius = |y| part.yarns.material(y).radius;
+        let radius = |y| part.now.material(y).radius;
         let normals = self.yarn_normals();
-        curves(
-            &part.yarns.mesh,
-            self.yarn_nodes(),
-            &normals,
-            radius,
-            samples,
-        )
+        curves(&part.now.mesh, self.yarn_nodes(), &normals, radius, samples)
     }
 
-    /// Tension between each incidence and the next of its yarn [N]; 0 at the last.
+    /// Tension between each incidence and the next of its yarn [N]; 0 at the last, and where triangles
+    /// stand for the yarn.
     pub fn yarn_tensions(&self) -> Vec<f64> {
         let Some(part) = &self.yarns else {
             return Vec::new();
         };
-        let (mesh, x) = (&part.yarns.mesh, self.yarn_nodes());
+        let (mesh, x) = (&part.now.mesh, self.yarn_nodes());
         let mut out = vec![0.0; mesh.incidences.len()];
         for y in 0..mesh.yarn_count() {
-            let stiffness = part.yarns.material(y).stretch;
+            let stiffness = part.now.material(y).stretch;
             for i in mesh.starts[y] as usize + 1..mesh.starts[y + 1] as usize {
-                let [a, b] = [i - 1, i].map(|i| x[mesh.incidences[i].node as usize]);
+                let nodes = [i - 1, i].map(|i| mesh.incidences[i].node);
+                if !mesh.reaches(&nodes) {
+                    continue;
+                }
+                let [a, b] = nodes.map(|n| x[n as usize]);
                 let du = self.state.u[i] - self.state.u[i - 1];
                 out[i - 1] = stiffness * ((b - a).norm() / du - 1.0);
             }
@@ -213,43 +255,64 @@ impl Sim {
         (0..count).map(|v| !follows(v)).collect()
     }
 
-    /// Holds nodes of yarns as [`Sim::pin`] holds vertices; yarns do not slide where they are held.
-    pub fn pin_yarn_nodes(&mut self, nodes: &[u32], targets: Option<&[[f64; 3]]>) -> Result<()> {
-        let first = self.first_node(nodes)?;
-        if let Some(targets) = targets {
-            if targets.len() != nodes.len() {
-                return Err(Error::argument(format!(
-                    "{} nodes but {} targets",
-                    nodes.len(),
-                    targets.len()
-                )));
-            }
-            for (n, t) in nodes.iter().zip(targets) {
-                finite(&format!("target of yarn node {n}"), t)?;
-            }
+    /// For each node of the yarns whether it moves by itself; triangles carry the others.
+    pub fn active_yarn_nodes(&self) -> Vec<bool> {
+        let nodes = self.mesh.uv.len() as u32..self.state.positions.len() as u32;
+        let rides = |n| self.yarns.as_ref().is_some_and(|part| part.riders.rides(n));
+        nodes.map(|n| !rides(n)).collect()
+    }
+
+    /// Grows whenever yarns have left contacts, or have come back to them with an earlier state: the numbers of
+    /// passages change then, and nodes come in. 0 without yarns.
+    pub fn yarn_epoch(&self) -> u64 {
+        self.yarns.as_ref().map_or(0, |part| part.epoch)
+    }
+
+    /// Numbers of what has changed since the yarns were laid.
+    pub fn yarn_changes(&self) -> YarnChanges {
+        let left = self.yarns().map_or(0, |mesh| {
+            (0..mesh.uv.len())
+                .filter(|n| mesh.stack(*n).is_empty())
+                .count()
+        });
+        YarnChanges {
+            passages_gone: self.state.topology.gone(),
+            nodes_split: self.state.topology.split.len(),
+            nodes_left: left,
         }
-        for (k, node) in nodes.iter().enumerate() {
-            self.hold(first + node, targets.map(|t| Vec3::from(t[k])));
-            if let Some(part) = &self.yarns {
-                for strand in part.yarns.mesh.stack(*node as usize) {
-                    self.state.sliding[strand.incidence as usize] = false;
-                    self.state.u_rates[strand.incidence as usize] = 0.0;
-                }
+    }
+
+    /// Takes the yarns of a state whose topology is another one.
+    pub(super) fn take_yarns(&mut self) -> Result<()> {
+        let Some(part) = &mut self.yarns else {
+            return Ok(());
+        };
+        if part.topology != self.state.topology {
+            let mut engine = self.engine.lock().unwrap_or_else(PoisonError::into_inner);
+            engine.take_contacts(&self.state)?;
+            if let Some(now) = &engine.system.yarns {
+                part.now = now.clone();
             }
+            part.topology.clone_from(&self.state.topology);
+            part.epoch += 1;
         }
-        self.epoch += 1;
         Ok(())
     }
 
-    /// Lets nodes of yarns go; one that is not held is refused.
-    pub fn unpin_yarn_nodes(&mut self, nodes: &[u32]) -> Result<()> {
-        let first = self.first_node(nodes)?;
-        if let Some(n) = nodes.iter().find(|n| !self.is_pinned(first + **n)) {
-            return Err(Error::argument(format!("yarn node {n} is not pinned")));
+    /// Refuses coordinates that do not grow along every yarn.
+    pub(super) fn check_coordinates(&self) -> Result<()> {
+        let u = &self.state.u;
+        let starts = self.yarns().map_or(&[][..], |mesh| &mesh.starts);
+        for (y, range) in starts.windows(2).enumerate() {
+            let yarn = &u[range[0] as usize..range[1] as usize];
+            if let Some(i) = yarn.windows(2).position(|w| !(w[1] > w[0])) {
+                return Err(Error::parse(format!(
+                    "yarn {y}: u goes from {} to {} m after passage {i}",
+                    yarn[i],
+                    yarn[i + 1]
+                )));
+            }
         }
-        let held: Vec<u32> = nodes.iter().map(|n| first + n).collect();
-        self.state.pins.retain(|p| !held.contains(&p.vertex));
-        self.epoch += 1;
         Ok(())
     }
 
@@ -257,17 +320,6 @@ impl Sim {
     pub(super) fn carry_vertices(&mut self) {
         if let Some(part) = &self.yarns {
             part.carry(&mut self.state);
-        }
-    }
-
-    /// Point number of node 0, all `nodes` being there.
-    fn first_node(&self, nodes: &[u32]) -> Result<u32> {
-        let count = self.yarn_nodes().len();
-        match nodes.iter().find(|&&n| n as usize >= count) {
-            Some(n) => Err(Error::argument(format!(
-                "yarn node {n} does not exist: the simulation has {count}"
-            ))),
-            None => Ok(self.mesh.uv.len() as u32),
         }
     }
 }

@@ -1,8 +1,9 @@
-//! Static drape: sewing, coarse levels, the unfolding of a tangle, and rest.
+//! Static drape: coarse levels, the unfolding of a tangle, and rest; sewing is in `sew`.
 
 use super::engine::Engine;
 use super::relax::{End, RelaxOptions, Relaxed, relax};
 use super::rest::{self, Rest};
+use super::sew::{NEARLY_CLOSED, sew};
 use super::step::{Totals, step};
 use crate::blend::embed::carried;
 use crate::error::{Result, Status};
@@ -28,7 +29,6 @@ pub struct Plan {
 }
 
 /// Part of the progress bar that each stage fills.
-const SEW: (f64, f64) = (0.0, 0.25);
 const SETTLE: (f64, f64) = (0.25, 0.6);
 const UNFOLD: (f64, f64) = (0.0, 0.6);
 const REST: (f64, f64) = (0.6, 1.0);
@@ -52,14 +52,6 @@ const STILL: f64 = 1e-4;
 const PROBE_STEP: f64 = 1.0 / 30.0;
 const PROBE_STEPS: usize = 30;
 const QUIET_STEPS: usize = 4;
-
-/// Seams with a larger gap than this are pulled harder [m]; below it they are sewn.
-const NEARLY_CLOSED: f64 = 8e-3;
-/// How often the pull is doubled.
-const DOUBLINGS: usize = 5;
-
-/// A gap at which the seams count as closed [m].
-const CLOSED: f64 = 1e-3;
 
 /// Watches progress: fraction done, stage, residual; false stops.
 pub type Watch<'a> = dyn FnMut(f64, &'static str, f64) -> bool + 'a;
@@ -108,7 +100,7 @@ pub fn drape(
             carried = Some((coarse, coarse_state));
             break;
         }
-        carried = is_uncrossed(&coarse, &coarse_state)?.then_some((coarse, coarse_state));
+        carried = may_go_on(&coarse, &coarse_state)?.then_some((coarse, coarse_state));
     }
     // a drape that was stopped while it sewed goes on with that
     let open = engine.system.largest_seam_gap(&state.positions) > NEARLY_CLOSED;
@@ -195,9 +187,13 @@ fn place_bodies(state: &mut State) {
     }
 }
 
-/// Whether a coarse level may be carried on: a fold that passes through the cloth would stay for
-/// good, since contact does not uncross. The next level is sewn from where the panels are placed then.
-fn is_uncrossed(coarse: &Engine, state: &State) -> Result<bool> {
+/// Whether a coarse level may be carried on: a seam that a limb keeps open, or a fold that passes
+/// through the cloth would stay for good, since contact does not undo it. The next level is sewn from
+/// where the panels are placed then.
+fn may_go_on(coarse: &Engine, state: &State) -> Result<bool> {
+    if coarse.system.largest_seam_gap(&state.positions) > NEARLY_CLOSED {
+        return Ok(false);
+    }
     if coarse.settings.self_contact < 0.5 {
         return Ok(true);
     }
@@ -314,62 +310,8 @@ fn settle_options(plan: &Plan, force_tolerance: f64) -> RelaxOptions {
     }
 }
 
-/// Pulls the seams together without weight and friction. False if the drape is to end there.
-fn sew(
-    engine: &mut Engine,
-    state: &mut State,
-    plan: &Plan,
-    all: &mut Relaxed,
-    watch: &mut Watch<'_>,
-) -> Result<bool> {
-    if engine.system.cloth.mesh.seams.is_empty() {
-        return Ok(true);
-    }
-    let options = RelaxOptions {
-        force_tolerance: plan.force_tolerance,
-        seam_gap: CLOSED,
-        max_steps: plan.max_steps,
-        first_step: 0.01,
-        largest_step: 0.05,
-        disturbed: false,
-    };
-    let gravity = std::mem::replace(&mut state.gravity, Vec3::zeros());
-    let smooth = engine.system.bodies.with_friction(0.0);
-    let rough = std::mem::replace(&mut engine.system.bodies, smooth);
-    let settings = engine.settings.clone();
-    let done = close(engine, state, &options, all, watch);
-    engine.system.bodies = rough;
-    state.gravity = gravity;
-    state.body_anchors.clear();
-    let restored = engine.set_settings(&settings);
-    done?;
-    restored?;
-    Ok(!all.is_over())
-}
-
-/// Sews with the pull of the settings; a seam that stays open under it, because the garment is
-/// tight there, is pulled twice as hard, and so on.
-fn close(
-    engine: &mut Engine,
-    state: &mut State,
-    options: &RelaxOptions,
-    all: &mut Relaxed,
-    watch: &mut Watch<'_>,
-) -> Result<()> {
-    let mut settings = engine.settings.clone();
-    stage(engine, state, options, SEW, "sew", all, watch)?;
-    for _ in 0..DOUBLINGS {
-        if all.is_over() || engine.system.largest_seam_gap(&state.positions) < NEARLY_CLOSED {
-            break;
-        }
-        settings.seam_pull *= 2.0;
-        engine.set_settings(&settings)?;
-        stage(engine, state, options, SEW, "sew", all, watch)?;
-    }
-    Ok(())
-}
-
-fn stage(
+/// Relaxes as one stage of a drape, which fills a `range` of the progress bar.
+pub(super) fn stage(
     engine: &mut Engine,
     state: &mut State,
     options: &RelaxOptions,
@@ -398,16 +340,15 @@ fn stage(
 
 impl Relaxed {
     /// Whether what ended a stage ends the whole drape.
-    fn is_over(&self) -> bool {
+    pub(super) fn is_over(&self) -> bool {
         matches!(self.end, End::Cancelled | End::Falling(_))
     }
 }
 
-/// The state of a coarse level: as placed, in the same world, held at the vertices nearest to the
-/// pins of the fine one.
+/// The state of a coarse level: as placed, like the fine one, in the same world, held at the
+/// vertices nearest to the pins of the fine one, which may be vertices or nodes.
 fn coarse_state(coarse: &Engine, fine: &Engine, state: &State) -> State {
     let mesh = &coarse.system.cloth.mesh;
-    let fine_mesh = &fine.system.cloth.mesh;
     let mut out = State {
         positions: mesh.placed.clone(),
         velocities: vec![Vec3::zeros(); mesh.placed.len()],
@@ -417,15 +358,15 @@ fn coarse_state(coarse: &Engine, fine: &Engine, state: &State) -> State {
         ..state.clone()
     };
     for pin in &state.pins {
-        let panel = fine_mesh.vertex_panel[pin.vertex as usize] as usize;
-        let uv = fine_mesh.uv[pin.vertex as usize];
+        let panel = fine.system.panel_of(pin.vertex) as usize;
+        let uv = fine.system.flat_place(pin.vertex);
         let nearest = (mesh.panel_starts[panel]..mesh.panel_starts[panel + 1]).min_by(|a, b| {
             let d = |v: &u32| (mesh.uv[*v as usize] - uv).norm_squared();
             d(a).total_cmp(&d(b))
         });
         if let Some(vertex) = nearest {
             // the vertex may stand a little beside the pin: it keeps that offset
-            let offset = mesh.placed[vertex as usize] - fine_mesh.placed[pin.vertex as usize];
+            let offset = mesh.placed[vertex as usize] - state.positions[pin.vertex as usize];
             let target = pin.target + offset;
             if let Err(i) = out.pins.binary_search_by_key(&vertex, |p| p.vertex) {
                 out.pins.insert(i, Pin { vertex, target });

@@ -8,6 +8,7 @@ use super::linear::direct::Direct;
 use super::linear::ordering::seam_priorities;
 use super::linear::{LinearSolver, choose};
 use super::newton::{Inertia, Problem, Summary, Tolerance, Work, largest};
+use super::pace::ALMOST;
 use super::settings::Settings;
 use crate::error::Result;
 use crate::math::Vec3;
@@ -18,6 +19,9 @@ use crate::system::build::{BuildOptions, System};
 use crate::system::state::State;
 use crate::system::term::{Configuration, World};
 
+/// Blocks of a system with yarns below which every matrix is factored: conjugate gradients take many
+/// iterations on yarns, whose stretch is 1e4 times as stiff as their bending.
+const ALWAYS_DIRECT_YARNS: usize = 20_000;
 /// Corrections of one attempt at rest.
 const REST_ITERATIONS: u32 = 8;
 
@@ -59,8 +63,8 @@ pub enum Motion {
     Dynamic,
     /// Towards rest by one semi-implicit step: one Newton correction, rate terms off.
     Relax {
-        /// Whether the exact Hessian is tried.
-        exact: bool,
+        /// How much of the exact Hessian is tried.
+        exact: f64,
         /// Whether friction anchors and normal forces follow the step.
         follow: bool,
     },
@@ -76,7 +80,7 @@ impl Engine {
     /// A solver for a system.
     pub fn new(system: System, settings: &Settings) -> Self {
         let n = system.block_count();
-        let assembler = Assembler::new(n, &system.terms);
+        let assembler = Assembler::new(n, &system.terms, &system.points.riders);
         let workers = Workers::new(settings.threads as usize);
         let linear = linear_solver(&system, settings, &workers);
         Self {
@@ -127,6 +131,15 @@ impl Engine {
         Ok(())
     }
 
+    /// Takes the contacts that a state's yarns are in and where they slide.
+    pub fn take_contacts(&mut self, state: &State) -> Result<()> {
+        if self.system.take_contacts(state)? {
+            self.assembler
+                .rebuild(self.system.block_count(), &self.system.terms);
+        }
+        Ok(())
+    }
+
     /// Starts a call of the host: results depend on the state alone, not on what was solved before.
     pub fn begin(&mut self) {
         self.linear.forget();
@@ -172,10 +185,7 @@ impl Engine {
         fraction: f64,
         motion: Motion,
     ) -> Result<Attempt> {
-        if self.system.set_sliding(&state.sliding)? {
-            self.assembler
-                .rebuild(self.system.block_count(), &self.system.terms);
-        }
+        self.take_contacts(state)?;
         let dynamic = motion == Motion::Dynamic;
         let rest = matches!(motion, Motion::Rest { .. });
         let inv_dt = if dynamic { 1.0 / h } else { 0.0 };
@@ -196,10 +206,15 @@ impl Engine {
                 x[i] = place;
             }
         }
+        let riders = &self.system.points.riders;
+        riders.carry(&mut x);
         self.carry.way.clear();
         if rest {
             self.carry
                 .take_along(state, &self.center, &self.fixed, &self.system.bodies);
+            if !self.carry.way.is_empty() {
+                riders.carry(&mut self.carry.way);
+            }
         }
         let n = x.len();
         let system = &mut self.system;
@@ -237,6 +252,7 @@ impl Engine {
                 measure: &self.measure,
             },
             fixed: &self.fixed,
+            riders: &system.points.riders,
             idle: &self.idle,
             workers: &self.workers,
         };
@@ -248,6 +264,11 @@ impl Engine {
             },
             relative: if dynamic {
                 self.settings.newton_relative_tolerance
+            } else {
+                0.0
+            },
+            motion: if dynamic && system.has_yarns() {
+                self.settings.yarn_relative_velocity
             } else {
                 0.0
             },
@@ -266,14 +287,17 @@ impl Engine {
             } else {
                 (10.0 * self.settings.linear_tolerance).min(0.1)
             },
-            exactness: f64::from(u8::from(matches!(
-                motion,
-                Motion::Relax { exact: true, .. } | Motion::Rest { .. }
-            ))),
-            most_exactness: f64::from(u8::from(!matches!(
-                motion,
-                Motion::Relax { exact: false, .. }
-            ))),
+            exactness: match motion {
+                Motion::Dynamic => 0.0,
+                Motion::Relax { exact, .. } => exact,
+                Motion::Rest { .. } => 1.0,
+            },
+            most_exactness: match motion {
+                Motion::Relax { exact, .. } => exact,
+                Motion::Dynamic if system.has_yarns() => ALMOST,
+                _ => 1.0,
+            },
+            hasty: system.has_yarns(),
             strict: rest,
         };
         let linear: &mut dyn LinearSolver = if rest {
@@ -303,6 +327,7 @@ impl Engine {
             for pin in &state.pins {
                 x[pin.vertex as usize] = self.center[pin.vertex as usize];
             }
+            problem.riders.carry(&mut x);
             // where that costs energy everything but the pins is left behind
             if let Some(answer) = answer.1
                 && problem.value(&answer) <= problem.value(&x)
@@ -349,14 +374,17 @@ impl Engine {
         }
         system.unpack(&self.start, &x, h, state);
         if !matches!(motion, Motion::Relax { follow: false, .. }) {
-            system.follow_contacts(state, &self.workers);
+            // the forces of a relaxation are not those of a motion: yarns come out of contacts in time only
+            if system.follow_contacts(dynamic, state, &self.workers)? {
+                self.assembler.rebuild(system.block_count(), &system.terms);
+            }
         }
         system.bodies.accept(state);
         Ok(Attempt::Accepted(summary))
     }
 
     /// The quadratic part of a substep's potential. The terms of yarns bring their own inertia, which
-    /// is not diagonal; a relaxation takes lumped masses in its place.
+    /// is not diagonal; a relaxation takes lumped masses in its place, those of riders on the vertices that carry them.
     fn set_inertia(&mut self, state: &State, h: f64, dynamic: bool) {
         let system = &self.system;
         let points = &system.points;
@@ -377,6 +405,18 @@ impl Engine {
                 self.center[i] += state.velocities[i] * (h / (1.0 + alpha * h));
             }
             self.fixed[i] = !points.moves(i);
+        }
+        for rider in points.riders.list() {
+            let own = self.measure[rider.point as usize];
+            for (v, w) in rider.vertices.iter().zip(&rider.weights) {
+                // a rider just outside of its triangle has a weight below zero
+                let part = w.max(0.0) * own;
+                self.measure[*v as usize] += part;
+                if !dynamic {
+                    self.weight[*v as usize] += part;
+                }
+            }
+            self.weight[rider.point as usize] = 0.0;
         }
         let unknowns = &system.unknowns;
         for (k, owner) in unknowns.owners.iter().enumerate() {
@@ -399,12 +439,11 @@ impl Engine {
 }
 
 fn linear_solver(system: &System, settings: &Settings, workers: &Workers) -> Box<dyn LinearSolver> {
-    let mesh = &system.cloth.mesh;
-    let priorities = seam_priorities(mesh);
-    choose::solver(
-        settings.linear_kind as u32,
-        mesh.uv.len(),
-        Some(&priorities),
-        workers,
-    )
+    let priorities = (!system.has_yarns()).then(|| seam_priorities(&system.cloth.mesh));
+    let blocks = system.block_count();
+    let kind = match settings.linear_kind as u32 {
+        0 if system.has_yarns() && blocks < ALWAYS_DIRECT_YARNS => 1,
+        kind => kind,
+    };
+    choose::solver(kind, blocks, priorities.as_deref(), workers)
 }

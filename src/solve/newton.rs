@@ -8,6 +8,7 @@
 //! uses the same with `v0 = 0`. No step is accepted that raises `Phi`.
 
 use super::linear::{LinearError, LinearSolver};
+use crate::blend::Riders;
 use crate::error::{Error, Result, Status};
 use crate::math::Vec3;
 use crate::math::block::BlockMatrix;
@@ -34,6 +35,9 @@ pub struct Tolerance {
     pub displacement: f64,
     /// Decrease of `Phi` in an iteration over that in all of them.
     pub relative: f64,
+    /// A full correction over the whole displacement, both as root mean squares weighted by what
+    /// inertia resists with.
+    pub motion: f64,
     /// Largest force on a free vertex [N].
     pub force: f64,
     /// Newton iterations.
@@ -44,6 +48,9 @@ pub struct Tolerance {
     pub exactness: f64,
     /// How much of it is tried later.
     pub most_exactness: f64,
+    /// Whether all of that is tried as soon as a full correction does what its model promised, instead
+    /// of step by step.
+    pub hasty: bool,
     /// Whether a matrix that is not positive definite ends the solve instead of being made so by
     /// less of the exact Hessian.
     pub strict: bool,
@@ -69,6 +76,8 @@ pub struct Summary {
     pub moved: f64,
     /// How much of the exact Hessian the last correction used.
     pub exactness: f64,
+    /// Decrease of `Phi` by the last correction over what its quadratic model promised.
+    pub agreement: f64,
     /// Whether a strict solve met a matrix that is not positive definite.
     pub indefinite: bool,
     /// Corrections by a matrix at a point where nothing was carried any more.
@@ -90,8 +99,10 @@ pub struct Problem<'a> {
     pub inv_dt: f64,
     /// Quadratic part.
     pub inertia: Inertia<'a>,
-    /// Vertices that keep their place.
+    /// Vertices that keep their place, and points that ride.
     pub fixed: &'a [bool],
+    /// Points that ride on vertices.
+    pub riders: &'a Riders,
     /// Block and component of entries that nothing depends on.
     pub idle: &'a [(u32, u8)],
     /// Threads.
@@ -122,6 +133,8 @@ impl Work {
 
 /// Part of the displacement tolerance below which a force that inertia alone resists is no force.
 const UNMOVED: f64 = 1e-3;
+/// Decrease over the promised one from which a model is to be trusted.
+const AGREES: f64 = 0.5;
 /// Small corrections in one solve that are not taken for convergence at once.
 const DOUBTS: u32 = 4;
 
@@ -229,6 +242,7 @@ impl Problem<'_> {
                 .prepare(matrix)
                 .and_then(|()| linear.solve(matrix, &work.negative, &mut work.direction, 0.0));
             if solved.is_ok() {
+                self.riders.carry(&mut work.direction);
                 // the rows of fixed vertices have no answer
                 let moved = x.iter().zip(way).zip(&work.direction);
                 return (tried, Some(moved.map(|((x, w), d)| x + w + d).collect()));
@@ -304,6 +318,7 @@ impl Problem<'_> {
                 });
                 match solved {
                     Ok(iterations) => {
+                        self.riders.carry(&mut work.direction);
                         summary.linear_iterations += u64::from(iterations);
                         summary.exactness = kind.exactness();
                         break;
@@ -315,6 +330,7 @@ impl Problem<'_> {
                         return Ok(summary);
                     }
                     Err(_) if exactness > 0.0 => {
+                        summary.indefinite = true;
                         exactness = if exactness > 0.3 {
                             0.5 * exactness
                         } else {
@@ -353,11 +369,14 @@ impl Problem<'_> {
                 }
             }
             summary.last_length = length;
+            summary.agreement = -gain / (slope * length * (1.0 - 0.5 * length));
             summary.moved = length * reach;
             exactness = if tolerance.strict {
                 exactness
             } else if length < 1.0 {
                 0.0
+            } else if tolerance.hasty && summary.agreement > AGREES && !summary.indefinite {
+                tolerance.most_exactness
             } else {
                 (2.0 * exactness).max(0.25).min(tolerance.most_exactness)
             };
@@ -367,6 +386,18 @@ impl Problem<'_> {
             if tolerance.relative > 0.0 && gain <= tolerance.relative * (first - value) {
                 summary.converged = true;
                 return Ok(summary);
+            }
+            if tolerance.motion > 0.0 && length == 1.0 {
+                let weighed = |from: &dyn Fn(usize) -> Vec3| {
+                    let square = |i| self.inertia.measure[i] * from(i).norm_squared();
+                    (0..n).map(square).sum::<f64>()
+                };
+                let last = weighed(&|i| work.direction[i]);
+                let whole = weighed(&|i| x[i] - self.x0[i]);
+                if last <= tolerance.motion * tolerance.motion * whole {
+                    summary.converged = true;
+                    return Ok(summary);
+                }
             }
             if length * reach <= tolerance.displacement {
                 // where friction sticks in the model but slips in truth the correction is small and

@@ -1,13 +1,12 @@
-//! Relaxation: semi-implicit steps with kinetic damping, which end as Newton's method.
+//! Relaxation: semi-implicit steps towards rest, which end as Newton's method.
 //!
-//! The equations of motion without damping are integrated by steps of one Newton correction each
-//! (Baraff and Witkin 1998); the velocities are set to zero whenever the kinetic energy has passed a
-//! maximum (Umetani et al. 2011, section 7). The step size grows while the corrections are taken in
-//! full, so that near rest the inertia fades and the iteration becomes Newton's method for the
-//! static problem.
+//! The equations of motion without damping are integrated by steps of one Newton correction each (Baraff and
+//! Witkin 1998); [`pace`](super::pace) chooses their size and what becomes of the momentum. As the step grows the
+//! inertia fades and the iteration becomes Newton's method for the static problem.
 
 use super::drift::Drift;
 use super::engine::{Attempt, Engine, Motion};
+use super::pace::Pace;
 use super::step::Totals;
 use crate::error::{Error, Result, Status};
 use crate::math::Vec3;
@@ -57,8 +56,6 @@ pub struct Relaxed {
 /// Smallest step of a relaxation before it gives up [s].
 const SMALLEST_STEP: f64 = 1e-6;
 
-/// A correction below this part of the mean edge length counts as near rest.
-const NEAR: f64 = 0.05;
 /// Disturbance of the start over the mean edge length.
 const IMPERFECTION: f64 = 1e-5;
 /// Friction is frozen below this many force tolerances.
@@ -80,17 +77,13 @@ pub fn relax(
     let mut drift = Drift::new(&engine.system, state);
     out.totals.residual = f64::INFINITY;
     let mut h = options.first_step;
-    let mut kinetic = [0.0; 2];
-    // the exact Hessian pays near rest, far from it the way of steepest instability leads astray: it
-    // is tried where little moves, after full steps, less often where it failed
-    let mut moved = f64::INFINITY;
-    let (mut wait, mut patience) = (4_u32, 4_u32);
+    let mut pace = Pace::new(engine);
     state.velocities.fill(Vec3::zeros());
     if options.disturbed {
         disturb(state, IMPERFECTION * engine.system.mean_edge());
     }
     while out.totals.substeps < options.max_steps {
-        let exact = wait == 0 && moved < NEAR * engine.system.mean_edge();
+        let exact = pace.exactness(engine);
         // near rest friction is frozen while Newton's method converges: anchors that move after
         // every correction would creep
         let follow = out.totals.residual > FREEZE * options.force_tolerance
@@ -106,24 +99,10 @@ pub fn relax(
         };
         out.totals.newton_iterations += u64::from(summary.iterations);
         out.totals.linear_iterations += summary.linear_iterations;
-        if exact && summary.exactness < 1.0 {
-            patience = (2 * patience).min(64);
-        } else if exact {
-            patience = 1;
-        }
-        wait = if summary.last_length < 1.0 {
-            patience
-        } else if summary.exactness == 1.0 {
-            0
-        } else if exact {
-            patience
-        } else {
-            wait.saturating_sub(1)
-        };
+        pace.learn(engine, &summary, exact);
         if let Some(reason) = reason {
             out.totals.cut = true;
-            state.velocities.fill(Vec3::zeros());
-            kinetic = [0.0; 2];
+            pace.refused(state);
             h *= 0.25;
             if h < SMALLEST_STEP {
                 // nothing lower can be found: rest up to rounding, or a dead end that is reported
@@ -141,21 +120,10 @@ pub fn relax(
             continue;
         }
         out.totals.substeps += 1;
-        moved = summary.moved;
         out.totals.residual = summary.static_residual;
-        let energy = kinetic_energy(engine, state);
-        if energy < kinetic[0] && kinetic[0] >= kinetic[1] {
-            state.velocities.fill(Vec3::zeros());
-            kinetic = [0.0; 2];
-        } else {
-            kinetic = [energy, kinetic[0]];
-        }
-        if summary.last_length >= 1.0 {
-            h = (h * 1.3).min(options.largest_step);
-        } else if summary.last_length < 0.3 {
-            // short steps that are taken do lead on: only refused ones may end the relaxation
-            h = (0.6 * h).max(SMALLEST_STEP);
-        }
+        // short steps that are taken do lead on: only refused ones may end the relaxation
+        h = pace.taken(engine, state, &summary, h);
+        h = h.clamp(SMALLEST_STEP, options.largest_step);
         if options.seam_gap > 0.0
             && engine.system.largest_seam_gap(&state.positions) <= options.seam_gap
         {
@@ -199,13 +167,4 @@ fn disturb(state: &mut State, size: f64) {
             *x += offset * size;
         }
     }
-}
-
-fn kinetic_energy(engine: &Engine, state: &State) -> f64 {
-    state
-        .velocities
-        .iter()
-        .zip(&engine.system.points.masses)
-        .map(|(v, m)| 0.5 * m * v.norm_squared())
-        .sum()
 }

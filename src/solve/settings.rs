@@ -136,6 +136,8 @@ settings! {
     seam_pull: "seam.pull" = 50.0, 1e-3, 1e6, "N/m";
     /// Where yarns may slide through contacts: 0 nowhere, 1 where friction does not hold them, 2 everywhere, friction being a stiff spring where it holds.
     yarn_sliding: "yarn.sliding" = 1.0, 0.0, 2.0, "1" whole;
+    /// A substep of yarns has also converged when the last full Newton correction is no more than this part of the substep's displacement, both as root mean squares weighted by mass. 0 asks for the velocity tolerance alone.
+    yarn_relative_velocity: "yarn.relative_velocity" = 1e-3, 0.0, 0.5, "1";
     /// Inertia forces of yarn that slides: 1 on, 0 off.
     yarn_inertia: "yarn.inertia_forces" = 1.0, 0.0, 1.0, "1" whole;
     /// Quadratic drag of the air along the normal, times density of air.

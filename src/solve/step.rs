@@ -15,7 +15,7 @@ pub struct Totals {
     pub linear_iterations: u64,
     /// Residual of the last solve [N].
     pub residual: f64,
-    /// Whether a substep had to be cut.
+    /// Whether substeps were shorter than the settings ask, or a relaxation had to cut one.
     pub cut: bool,
 }
 
@@ -82,7 +82,6 @@ fn advance(
             }
             Err(error) => return Err(error),
         };
-        totals.cut = true;
         state.step_size = 0.5 * h;
         if state.step_size < min {
             return Err(Error::new(
@@ -95,6 +94,8 @@ fn advance(
             ));
         }
     }
+    // a step also takes many substeps where an earlier one had to
+    totals.cut = totals.substeps as f64 > (dt / max).ceil().max(1.0);
     state.time = end;
     for body in &mut state.bodies {
         body.moved_with_time = true;

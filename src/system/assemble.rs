@@ -2,8 +2,10 @@
 //!
 //! Kernels run in parallel over chunks of stencils into a buffer; the scatter into vertices and
 //! blocks runs in stencil order, so that the result has the same bits for any number of threads.
+//! What belongs to a point that rides on a triangle goes to the vertices that carry it.
 
 use super::term::{Configuration, HessianKind, Term};
+use crate::blend::Riders;
 use crate::math::block::{BlockMatrix, BlockPattern};
 use crate::math::parallel::Workers;
 use crate::math::{Mat3, Vec3};
@@ -14,6 +16,24 @@ const BATCH_BLOCKS: usize = 40_960;
 const CHUNK: usize = 128;
 /// Set in a slot when the stored block is the transpose of the stencil's block.
 const TRANSPOSED: u32 = 1 << 31;
+/// Set in an entry of a plan that is a number of a spread instead of a slot.
+const SPREAD: u32 = 1 << 30;
+
+/// One of the blocks that a block with a rider goes to.
+#[derive(Clone, Copy, Debug)]
+struct Share {
+    slot: u32,
+    weight: f64,
+    /// Whether the block and its transpose both go to this diagonal block.
+    both: bool,
+}
+
+/// Where the blocks with riders go: shares of spread `k` are `starts[k]..starts[k + 1]`.
+#[derive(Debug, Default)]
+struct Spreads {
+    starts: Vec<u32>,
+    shares: Vec<Share>,
+}
 
 /// The matrix of a system and where each stencil's blocks go in it.
 #[derive(Debug)]
@@ -21,16 +41,20 @@ pub struct Assembler {
     matrix: BlockMatrix,
     /// Per term, per stencil: slots of its lower blocks.
     plans: Vec<Vec<u32>>,
+    spreads: Spreads,
+    riders: Riders,
     gradients: Vec<Vec3>,
     blocks: Vec<Mat3>,
 }
 
 impl Assembler {
     /// Pattern and plans for the present stencils of the terms.
-    pub fn new(vertex_count: usize, terms: &[Box<dyn Term>]) -> Self {
+    pub fn new(vertex_count: usize, terms: &[Box<dyn Term>], riders: &Riders) -> Self {
         let mut assembler = Self {
             matrix: BlockMatrix::zeros(BlockPattern::from_stencils(0, |_| {})),
             plans: Vec::new(),
+            spreads: Spreads::default(),
+            riders: riders.clone(),
             gradients: vec![Vec3::zeros(); BATCH_BLOCKS],
             blocks: vec![Mat3::zeros(); BATCH_BLOCKS],
         };
@@ -40,21 +64,37 @@ impl Assembler {
 
     /// Takes changed stencils. The pattern changes only where a new coupling asks for it.
     pub fn rebuild(&mut self, vertex_count: usize, terms: &[Box<dyn Term>]) {
+        let riders = &self.riders;
         let pattern = BlockPattern::from_stencils(vertex_count, |sink| {
+            let mut carriers = Vec::new();
             for term in terms {
                 let stencils = term.stencils();
                 for e in 0..stencils.count() {
-                    sink(stencils.get(e));
+                    let points = stencils.get(e);
+                    if points.iter().any(|p| riders.rides(*p)) {
+                        carriers.clear();
+                        for p in points {
+                            carriers.extend(carried_by(riders, *p).map(|(v, _)| v));
+                        }
+                        sink(&carriers);
+                    } else {
+                        sink(points);
+                    }
                 }
             }
         });
         if pattern != self.matrix.pattern {
             self.matrix = BlockMatrix::zeros(pattern);
         }
+        let mut spreads = Spreads {
+            starts: vec![0],
+            shares: Vec::new(),
+        };
         self.plans = terms
             .iter()
-            .map(|t| plan(&self.matrix.pattern, t.as_ref()))
+            .map(|t| plan(&self.matrix.pattern, t.as_ref(), riders, &mut spreads))
             .collect();
+        self.spreads = spreads;
     }
 
     /// The matrix last assembled.
@@ -70,6 +110,8 @@ impl Assembler {
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         self.plans.iter().map(|p| p.len() * 4).sum::<usize>()
+            + self.spreads.starts.len() * 4
+            + self.spreads.shares.len() * size_of::<Share>()
             + self.matrix.blocks.len() * 76
             + self.gradients.len() * 24
             + self.blocks.len() * 72
@@ -119,7 +161,14 @@ impl Assembler {
                 for k in 0..batch {
                     let vertices = stencils.get(first + k);
                     for (v, g) in vertices.iter().zip(&self.gradients[k * arity..]) {
-                        out[*v as usize] += g;
+                        match self.riders.of(*v) {
+                            None => out[*v as usize] += g,
+                            Some(rider) => {
+                                for (v, w) in rider.vertices.iter().zip(&rider.weights) {
+                                    out[*v as usize] += g * *w;
+                                }
+                            }
+                        }
                     }
                 }
                 if kind.is_none() {
@@ -127,6 +176,11 @@ impl Assembler {
                 }
                 let slots = &self.plans[t][first * block_count..(first + batch) * block_count];
                 for (slot, block) in slots.iter().zip(&self.blocks) {
+                    if slot & SPREAD != 0 {
+                        self.spreads
+                            .add((slot & !SPREAD) as usize, block, &mut self.matrix);
+                        continue;
+                    }
                     let target = &mut self.matrix.blocks[(slot & !TRANSPOSED) as usize];
                     if slot & TRANSPOSED == 0 {
                         *target += block;
@@ -148,7 +202,57 @@ pub fn energy(terms: &[Box<dyn Term>], at: &Configuration<'_>, workers: &Workers
         .sum()
 }
 
-fn plan(pattern: &BlockPattern, term: &dyn Term) -> Vec<u32> {
+/// Vertices that carry a point, with weights: itself, unless it rides.
+fn carried_by(riders: &Riders, point: u32) -> impl Iterator<Item = (u32, f64)> {
+    let (vertices, weights, count) = match riders.of(point) {
+        Some(rider) => (rider.vertices, rider.weights, 3),
+        None => ([point; 3], [1.0; 3], 1),
+    };
+    vertices.into_iter().zip(weights).take(count)
+}
+
+impl Spreads {
+    /// Takes block `(i, j)` of a stencil, in which something rides; its number.
+    fn plan(&mut self, pattern: &BlockPattern, riders: &Riders, i: u32, j: u32) -> u32 {
+        for (p, wp) in carried_by(riders, i) {
+            for (q, wq) in carried_by(riders, j) {
+                // of a diagonal block the other half is the transpose of this one
+                if i == j && p < q {
+                    continue;
+                }
+                let slot = pattern.slot(p.max(q), p.min(q)).map_or(0, |s| s as u32);
+                self.shares.push(Share {
+                    slot: if p >= q { slot } else { slot | TRANSPOSED },
+                    weight: wp * wq,
+                    both: i != j && p == q,
+                });
+            }
+        }
+        self.starts.push(self.shares.len() as u32);
+        self.starts.len() as u32 - 2
+    }
+
+    fn add(&self, k: usize, block: &Mat3, matrix: &mut BlockMatrix) {
+        let range = self.starts[k] as usize..self.starts[k + 1] as usize;
+        for share in &self.shares[range] {
+            let target = &mut matrix.blocks[(share.slot & !TRANSPOSED) as usize];
+            let part = block * share.weight;
+            if share.both || share.slot & TRANSPOSED != 0 {
+                *target += part.transpose();
+            }
+            if share.both || share.slot & TRANSPOSED == 0 {
+                *target += part;
+            }
+        }
+    }
+}
+
+fn plan(
+    pattern: &BlockPattern,
+    term: &dyn Term,
+    riders: &Riders,
+    spreads: &mut Spreads,
+) -> Vec<u32> {
     let stencils = term.stencils();
     let mut slots =
         Vec::with_capacity(stencils.count() * stencils.arity * (stencils.arity + 1) / 2);
@@ -156,6 +260,10 @@ fn plan(pattern: &BlockPattern, term: &dyn Term) -> Vec<u32> {
         let vertices = stencils.get(e);
         for (a, &i) in vertices.iter().enumerate() {
             for &j in &vertices[..=a] {
+                if riders.rides(i) || riders.rides(j) {
+                    slots.push(spreads.plan(pattern, riders, i, j) | SPREAD);
+                    continue;
+                }
                 let slot = pattern.slot(i.max(j), i.min(j)).map_or(0, |s| s as u32);
                 slots.push(if i >= j { slot } else { slot | TRANSPOSED });
             }

@@ -20,6 +20,8 @@ const MAX_STRIDES: usize = 4096;
 struct Entry {
     original: Body,
     contact: ContactSettings,
+    /// Depth below the body's surface at which the surface is taken to be [m].
+    inset: f64,
     start: Body,
     end: Body,
     start_vertices: Vec<Vec3>,
@@ -42,6 +44,7 @@ impl BodySet {
         self.entries.push(Entry {
             original: body.clone(),
             contact: *contact,
+            inset: 0.0,
             start: body.clone(),
             end: body.clone(),
             start_vertices: Vec::new(),
@@ -85,6 +88,16 @@ impl BodySet {
         let mut set = self.clone();
         for entry in &mut set.entries {
             entry.contact.friction *= factor;
+        }
+        set
+    }
+
+    /// The same bodies without what lies less than `inset` below their surface [m].
+    #[must_use]
+    pub fn shrunk(&self, inset: f64) -> Self {
+        let mut set = self.clone();
+        for entry in &mut set.entries {
+            entry.inset = inset;
         }
         set
     }
@@ -159,7 +172,7 @@ impl BodySet {
     /// Signed distance at the start of the substep.
     pub fn value_at_start(&self, body: usize, point: &Vec3) -> f64 {
         let entry = &self.entries[body];
-        entry.start.value(&entry.from.to_body(point))
+        entry.start.value(&entry.from.to_body(point)) + entry.inset
     }
 
     /// Whether the straight path of a point over the substep, seen from the body that moves and
@@ -169,7 +182,7 @@ impl BodySet {
     pub fn passes_through(&self, body: usize, x0: &Vec3, x: &Vec3, depth: f64) -> bool {
         let entry = &self.entries[body];
         let q = entry.to.to_body(x);
-        let end = entry.end.value(&q);
+        let end = entry.end.value(&q) + entry.inset;
         // too short a path to come that deep
         let longest = (q - entry.from.to_body(x0)).norm() + entry.way;
         if end - SLOPE * longest >= -depth {
@@ -179,7 +192,7 @@ impl BodySet {
         let p = entry.to.to_body(&self.carried(body, x0));
         let length = (q - p).norm();
         dips(
-            |s| entry.end.value(&p.lerp(&q, s / length)),
+            |s| entry.end.value(&p.lerp(&q, s / length)) + entry.inset,
             length,
             end,
             depth,
@@ -220,12 +233,12 @@ impl Bodies for BodySet {
 
     fn distance(&self, body: usize, point: &Vec3) -> Distance {
         let entry = &self.entries[body];
-        distance(&entry.end, &entry.to, point)
+        distance(&entry.end, &entry.to, entry.inset, point)
     }
 
     fn value(&self, body: usize, point: &Vec3) -> f64 {
         let entry = &self.entries[body];
-        entry.end.value(&entry.to.to_body(point))
+        entry.end.value(&entry.to.to_body(point)) + entry.inset
     }
 
     fn carried(&self, body: usize, point: &Vec3) -> Vec3 {
@@ -258,7 +271,7 @@ impl Bodies for AtStart<'_> {
 
     fn distance(&self, body: usize, point: &Vec3) -> Distance {
         let entry = &self.0.entries[body];
-        distance(&entry.start, &entry.from, point)
+        distance(&entry.start, &entry.from, entry.inset, point)
     }
 
     fn value(&self, body: usize, point: &Vec3) -> f64 {
@@ -274,12 +287,12 @@ impl Bodies for AtStart<'_> {
     }
 }
 
-/// Distance to a body in a pose, derivatives by world coordinates.
-fn distance(body: &Body, pose: &Pose, point: &Vec3) -> Distance {
+/// Distance to a body in a pose, `inset` below its surface, derivatives by world coordinates.
+fn distance(body: &Body, pose: &Pose, inset: f64, point: &Vec3) -> Distance {
     let d = body.distance(&pose.to_body(point));
     let r = pose.rotation.to_rotation_matrix();
     Distance {
-        value: d.value,
+        value: d.value + inset,
         gradient: r * d.gradient,
         hessian: r.matrix() * d.hessian * r.matrix().transpose(),
     }

@@ -17,19 +17,22 @@ use super::term::{Bodies, Term};
 use super::yarn::contacts::{Contacts, Sliding};
 use super::yarn::unknowns::Unknowns;
 use super::yarn::{self, YarnOptions};
+use crate::blend::Riders;
 use crate::cloth::Cloth;
 use crate::error::Result;
 use crate::math::parallel::Workers;
-use crate::math::{Vec3, topology};
-use crate::yarn::Yarns;
+use crate::math::{Vec2, Vec3, topology};
+use crate::yarn::{Topology, Yarns};
 use std::sync::Arc;
 
 /// A compiled garment.
 pub struct System {
     /// Rest data of the triangle part.
     pub cloth: Cloth,
-    /// Rest data of the yarns, if there are any.
+    /// Rest data of the yarns as they are now, if there are any.
     pub yarns: Option<Arc<Yarns>>,
+    laid: Option<Arc<Yarns>>,
+    topology: Topology,
     /// Vertices and nodes.
     pub points: Points,
     /// Blocks of the yarns' unknowns, after those of the vertices.
@@ -83,22 +86,27 @@ impl From<&BuildOptions> for YarnOptions {
 impl System {
     /// Compiles a garment of triangles alone; bodies come later.
     pub fn new(cloth: Cloth, options: &BuildOptions) -> Result<Self> {
-        Self::with_yarns(cloth, None, options)
+        Self::with_yarns(cloth, None, &Riders::default(), options)
     }
 
-    /// Compiles a garment whose yarns are simulated where the cloth has no triangles.
+    /// Compiles a garment whose yarns, as laid, are simulated where the cloth has no triangles; at the
+    /// border some of their nodes ride on triangles.
     pub fn with_yarns(
         cloth: Cloth,
         yarns: Option<Arc<Yarns>>,
+        riders: &Riders,
         options: &BuildOptions,
     ) -> Result<Self> {
-        let points = Points::new(&cloth, yarns.as_deref());
+        let points = Points {
+            riders: riders.clone(),
+            ..Points::new(&cloth, yarns.as_deref())
+        };
         let sliding = vec![false; yarns.as_ref().map_or(0, |y| y.mesh.incidences.len())];
         let unknowns = unknowns(&cloth, yarns.as_deref(), &sliding)?;
         let yarn_options = YarnOptions::from(options);
         let contacts = yarns
             .clone()
-            .map(|y| Contacts::new(y, &yarn_options))
+            .map(|y| Contacts::new(y.clone(), y, &yarn_options))
             .transpose()?;
         let terms = terms(&cloth, &points, yarns.as_deref(), &unknowns, options)?;
         let edges = topology::edges(&cloth.mesh.triangles);
@@ -108,7 +116,9 @@ impl System {
             .collect();
         Ok(Self {
             cloth,
+            laid: yarns.clone(),
             yarns,
+            topology: Topology::default(),
             points,
             unknowns,
             sliding,
@@ -141,14 +151,18 @@ impl System {
         self.points.count() + self.unknowns.slide_blocks()
     }
 
-    /// Takes which yarns slide where; true if unknowns have come or gone.
-    pub fn set_sliding(&mut self, sliding: &[bool]) -> Result<bool> {
-        if *sliding == *self.sliding {
-            return Ok(false);
+    /// Takes the contacts that a state's yarns are in and where they slide; true if unknowns have come or gone.
+    pub fn take_contacts(&mut self, state: &State) -> Result<bool> {
+        match &self.laid {
+            Some(laid) if state.topology != self.topology => {
+                let now = laid.present(&state.topology)?;
+                self.set_yarns(laid.clone(), now, &state.topology)?;
+            }
+            _ if *state.sliding == *self.sliding => return Ok(false),
+            _ => {}
         }
-        self.unknowns = unknowns(&self.cloth, self.yarns.as_deref(), sliding)?;
-        self.sliding.clear();
-        self.sliding.extend_from_slice(sliding);
+        self.unknowns = unknowns(&self.cloth, self.yarns.as_deref(), &state.sliding)?;
+        self.sliding.clone_from(&state.sliding);
         self.terms = terms(
             &self.cloth,
             &self.points,
@@ -159,17 +173,45 @@ impl System {
         Ok(true)
     }
 
-    /// After an accepted step: the normal forces of the yarns' contacts, and what slides next.
-    pub fn follow_contacts(&mut self, state: &mut State, workers: &Workers) {
-        if let Some(contacts) = &mut self.contacts {
-            contacts.follow(self.options.sliding, state, workers);
-        }
+    fn set_yarns(&mut self, laid: Arc<Yarns>, now: Yarns, topology: &Topology) -> Result<()> {
+        let now = Arc::new(now);
+        let options = YarnOptions::from(&self.options);
+        self.contacts = Some(Contacts::new(laid, now.clone(), &options)?);
+        // nodes that come in are counted on after those that ride
+        let riders = std::mem::take(&mut self.points.riders);
+        self.points = Points {
+            riders,
+            ..Points::new(&self.cloth, Some(&now))
+        };
+        self.yarns = Some(now);
+        self.topology.clone_from(topology);
+        self.sliding.clear();
+        Ok(())
     }
 
-    /// Values of all blocks in a state.
+    /// After an accepted step: the normal forces of the yarns' contacts, what slides next, and, if it was one in time
+    /// (`releases`), which contacts have come off; true if some have and unknowns have come or gone.
+    pub fn follow_contacts(
+        &mut self,
+        releases: bool,
+        state: &mut State,
+        workers: &Workers,
+    ) -> Result<bool> {
+        let (Some(contacts), Some(laid)) = (&mut self.contacts, &self.laid) else {
+            return Ok(false);
+        };
+        let Some(now) = contacts.follow(self.options.sliding, releases, state, workers)? else {
+            return Ok(false);
+        };
+        self.set_yarns(laid.clone(), now, &state.topology)?;
+        self.take_contacts(state)
+    }
+
+    /// Values of all blocks in a state, riders where their triangles are.
     pub fn pack(&self, state: &State, x: &mut Vec<Vec3>) {
         x.clear();
         x.extend_from_slice(&state.positions);
+        self.points.riders.carry(x);
         x.resize(self.block_count(), Vec3::zeros());
         for (u, slot) in state.u.iter().zip(&self.unknowns.slides) {
             if let Some((block, c)) = slot {
@@ -214,6 +256,15 @@ impl System {
         }
     }
 
+    /// Flat coordinates of a point in its panel [m].
+    pub fn flat_place(&self, point: u32) -> Vec2 {
+        let p = point as usize;
+        match (&self.yarns, p.checked_sub(self.points.vertex_count)) {
+            (Some(yarns), Some(node)) => yarns.mesh.uv[node],
+            _ => self.cloth.mesh.uv[p],
+        }
+    }
+
     /// Points of each part that hangs together by triangles, yarns and seams, parts by their first
     /// point. Points that do not move by themselves belong to none.
     pub fn parts(&self) -> Vec<Vec<u32>> {
@@ -222,6 +273,8 @@ impl System {
         let links = mesh.seams.iter().flat_map(|s| &s.links);
         let sewn = links.flat_map(|l| [[l.vertex, l.edge[0]], [l.vertex, l.edge[1]]]);
         let node = |n| self.unknowns.node(n);
+        let riders = self.points.riders.list().iter();
+        let ridden = riders.flat_map(|r| r.vertices.map(|v| [r.point, v]));
         let yarns = self.yarns.iter().flat_map(|y| {
             let ties = y.mesh.ties.iter().map(|t| [t.node, t.segment[0]]);
             (0..y.mesh.yarn_count())
@@ -230,7 +283,8 @@ impl System {
                 .chain(ties)
                 .map(|pair| pair.map(node))
         });
-        for [a, b] in self.edges.iter().copied().chain(sewn).chain(yarns) {
+        let links = self.edges.iter().copied().chain(sewn).chain(ridden);
+        for [a, b] in links.chain(yarns) {
             let (a, b) = (find(&mut root, a), find(&mut root, b));
             root[a.max(b) as usize] = a.min(b);
         }
@@ -245,6 +299,11 @@ impl System {
             parts[place[top as usize]].push(v);
         }
         parts
+    }
+
+    /// Whether yarns are simulated.
+    pub fn has_yarns(&self) -> bool {
+        self.yarns.is_some()
     }
 
     /// Mean rest length of the edges, of the yarns' segments where there are no triangles [m].
@@ -321,12 +380,14 @@ impl System {
             .fold(sewn, f64::max)
     }
 
-    /// Smallest signed distance of a vertex to a body [m], infinite without bodies.
+    /// Smallest signed distance of a point to a body [m], infinite without bodies. Nodes that no yarn passes
+    /// do not count.
     pub fn smallest_gap(&self, x: &[Vec3]) -> f64 {
         let mut gap = f64::INFINITY;
+        let passed = |i: &usize| *i < self.points.vertex_count || self.points.moves(*i);
         for b in 0..self.bodies.count() {
-            for p in x {
-                gap = gap.min(self.bodies.value(b, p));
+            for i in (0..x.len()).filter(passed) {
+                gap = gap.min(self.bodies.value(b, &x[i]));
             }
         }
         gap
@@ -388,7 +449,10 @@ fn terms(
         )));
     }
     terms.push(Box::new(Pressure::new(cloth)));
-    if let Some(Yarns { mesh, materials }) = yarns {
+    if let Some(Yarns {
+        mesh, materials, ..
+    }) = yarns
+    {
         terms.extend(yarn::terms(mesh, materials, unknowns, &options.into())?);
     }
     if options.self_contact {

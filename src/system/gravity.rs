@@ -32,7 +32,7 @@ impl Gravity {
             .map(|(t, tri)| {
                 let [a, b, c] = tri.map(|v| mesh.uv[v as usize]);
                 Element {
-                    density: cloth.fabric_of(t).density,
+                    density: cloth.densities[t],
                     area: cloth.areas[t],
                     fabric: cloth.panel_fabric[mesh.triangle_panel[t] as usize],
                     edges: [b - a, c - a],

@@ -32,6 +32,9 @@ struct Element {
     stiffness: Mat3,
     damping: f64,
     fabric: usize,
+    /// Square roots of the parts of the stiffness along weft and warp that are the triangle's own,
+    /// and of their geometric mean.
+    share: Vec3,
     /// Flat to material coordinates.
     rotation: Mat2,
 }
@@ -52,6 +55,11 @@ fn stiffness(f: &Fabric) -> Mat3 {
     Matrix3::new(
         f.weft, f.coupling, 0.0, f.coupling, f.warp, 0.0, 0.0, 0.0, f.shear,
     )
+}
+
+/// `D C D` with the diagonal `D` of `share`.
+fn scaled(stiffness: &Mat3, share: &Vec3) -> Mat3 {
+    stiffness.component_mul(&(share * share.transpose()))
 }
 
 fn shape_gradients(inverse: &Mat2) -> [Vec2; 3] {
@@ -82,7 +90,7 @@ fn tensor(s: &Vec3) -> Mat2 {
 }
 
 impl Membrane {
-    /// The membrane of a cloth, its stiffness times a factor.
+    /// The membrane of a cloth, its stiffness times a factor and each triangle's own share.
     pub fn new(cloth: &Cloth, factor: f64) -> Self {
         let mesh = &cloth.mesh;
         let elements = mesh
@@ -96,10 +104,13 @@ impl Membrane {
                 let (p, q) = (b - a, c - a);
                 let det = cross2(&p, &q);
                 let fabric = cloth.fabric_of(t);
+                let [weft, warp] = cloth.share[t].map(f64::sqrt);
+                let share = Vec3::new(weft, warp, (weft * warp).sqrt());
                 Element {
                     inverse: Mat2::new(q.y, -q.x, -p.y, p.x) / det,
                     area: 0.5 * det.abs(),
-                    stiffness: factor * stiffness(fabric),
+                    stiffness: factor * scaled(&stiffness(fabric), &share),
+                    share,
                     damping: fabric.damping_stiffness,
                     fabric: cloth.panel_fabric[panel],
                     rotation,
@@ -235,7 +246,7 @@ impl Term for Membrane {
         } else {
             (since, Vec3::zeros())
         };
-        let dstress = stiffness(fabric) * (now + since * damping)
+        let dstress = scaled(&stiffness(fabric), &element.share) * (now + since * damping)
             + element.stiffness * (dnow + dsince * damping + since * ddamping);
         let p = f * tensor(&stress);
         let dp = df * tensor(&stress) + f * tensor(&dstress);

@@ -2,8 +2,10 @@
 //!
 //! A vertex stands for a third of the triangles around it, a node for half of the yarn between it
 //! and its neighbours; a yarn of radius `R` covers `2 R` of the surface. A vertex without triangles
-//! does not move by itself: it follows the yarns laid where it is.
+//! does not move by itself: it follows the yarns laid where it is. Nor does a node that rides on
+//! triangles.
 
+use crate::blend::Riders;
 use crate::cloth::Cloth;
 use crate::yarn::Yarns;
 
@@ -20,10 +22,12 @@ pub struct Points {
     pub radii: Vec<f64>,
     /// Number of vertices.
     pub vertex_count: usize,
+    /// Nodes that ride on triangles.
+    pub riders: Riders,
 }
 
 impl Points {
-    /// Points of a cloth and, if there are any, of yarns.
+    /// Points of a cloth and, if there are any, of yarns; nothing rides.
     pub fn new(cloth: &Cloth, yarns: Option<&Yarns>) -> Self {
         let n = cloth.mesh.uv.len();
         let mut points = Self {
@@ -32,6 +36,7 @@ impl Points {
             damping: vec![0.0; n],
             radii: vec![0.0; n],
             vertex_count: n,
+            riders: Riders::default(),
         };
         for (d, panel) in points.damping.iter_mut().zip(&cloth.mesh.vertex_panel) {
             *d = cloth.fabrics[cloth.panel_fabric[*panel as usize]].damping_mass;
@@ -56,6 +61,9 @@ impl Points {
             let material = yarns.material(y);
             let yarn = yarns.mesh.yarn(y);
             for pair in yarn.windows(2) {
+                if !yarns.mesh.reaches(&[pair[0].node, pair[1].node]) {
+                    continue;
+                }
                 let half = 0.5 * (pair[1].u - pair[0].u);
                 for end in pair {
                     let p = self.vertex_count + end.node as usize;
@@ -75,6 +83,6 @@ impl Points {
 
     /// Whether the point moves by itself.
     pub fn moves(&self, point: usize) -> bool {
-        self.areas[point] > 0.0
+        self.areas[point] > 0.0 && !self.riders.rides(point as u32)
     }
 }

@@ -10,10 +10,11 @@ use crate::cloth::Cloth;
 use crate::error::{Error, Result};
 use crate::math::Vec3;
 use crate::math::hash::Hash;
+use crate::pattern::BlendRegion;
 use serde::{Deserialize, Serialize};
 
 const MAGIC: &[u8; 8] = b"TOILESNP";
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 const HEADER: usize = 8 + 4 + 8;
 
 /// What a state belongs to: everything else that the next bits depend on. A state means the same in
@@ -41,7 +42,9 @@ impl Origin {
     /// What is not as in `own`, the origin of the simulation that restores.
     fn difference(&self, own: &Self) -> Option<String> {
         if self.garment != own.garment {
-            return Some("it was taken of another garment, resolution or fabric".into());
+            return Some(
+                "it was taken of another garment, resolution, fabric or blend region".into(),
+            );
         }
         if self.bodies.len() != own.bodies.len() {
             return Some(format!(
@@ -90,8 +93,8 @@ impl Origin {
     }
 }
 
-/// A number that two systems share only if their meshes and fabrics are the same.
-pub fn fingerprint(cloth: &Cloth) -> u64 {
+/// A number that two systems share only if their meshes, fabrics and blend regions are the same.
+pub fn fingerprint(cloth: &Cloth, regions: &[BlendRegion]) -> u64 {
     let mut hash = Hash::default();
     for p in &cloth.mesh.uv {
         hash.numbers([p.x, p.y]);
@@ -106,6 +109,13 @@ pub fn fingerprint(cloth: &Cloth) -> u64 {
     }
     for f in &cloth.fabrics {
         hash.add(format!("{f:?}").as_bytes());
+    }
+    for region in regions {
+        hash.add(&region.panel.to_le_bytes());
+        hash.add(&region.rings.to_le_bytes());
+        for p in &region.polygon {
+            hash.numbers([p.x, p.y]);
+        }
     }
     hash.value()
 }
@@ -171,7 +181,11 @@ pub fn read(bytes: &[u8], own: &Origin, like: &State) -> Result<State> {
 }
 
 fn check(state: &State, like: &State) -> std::result::Result<(), String> {
-    let n = like.positions.len();
+    // what the topology of either has added or taken
+    let (own, other) = (&like.topology, &state.topology);
+    let [n, nodes] = [like.positions.len(), like.yarn_normals.len()]
+        .map(|n| n - own.split.len() + other.split.len());
+    let passages = (like.u.len() + own.gone()).checked_sub(other.gone());
     if state.positions.len() != n || state.velocities.len() != n {
         return Err(format!(
             "{} vertices, {n} are expected",
@@ -185,18 +199,21 @@ fn check(state: &State, like: &State) -> std::result::Result<(), String> {
             like.bodies.len()
         ));
     }
-    if state.u.len() != like.u.len()
-        || state.u_rates.len() != like.u.len()
-        || state.sliding.len() != like.u.len()
-        || state.strands.len() != like.strands.len()
-        || state.yarn_normals.len() != like.yarn_normals.len()
+    let [u, rates, sliding, strands] = [
+        state.u.len(),
+        state.u_rates.len(),
+        state.sliding.len(),
+        state.strands.len(),
+    ];
+    if [u, rates, sliding, strands]
+        .iter()
+        .any(|n| Some(*n) != passages)
+        || state.yarn_normals.len() != nodes
     {
         return Err(format!(
-            "{} passages of yarns in {} strands, {} in {} are expected",
-            state.u.len(),
-            state.strands.len(),
-            like.u.len(),
-            like.strands.len()
+            "{u} passages of yarns in {strands} strands of {} nodes, {} of {nodes} are expected",
+            state.yarn_normals.len(),
+            passages.unwrap_or_default()
         ));
     }
     let fine = |v: &Vec3| v.iter().all(|c| c.is_finite());

@@ -2,6 +2,7 @@
 
 use crate::body::Pose;
 use crate::math::Vec3;
+use crate::yarn::Topology;
 use serde::{Deserialize, Serialize};
 
 /// The mutable part of a simulation; a snapshot is exactly this.
@@ -13,6 +14,8 @@ pub struct State {
     pub positions: Vec<Vec3>,
     /// Their velocities [m/s].
     pub velocities: Vec<Vec3>,
+    /// Passages of yarns that are not as laid.
+    pub topology: Topology,
     /// Material coordinate of each passage of a yarn through a node [m]; empty without yarns.
     pub u: Vec<f64>,
     /// Their rates [m/s].

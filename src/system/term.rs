@@ -20,7 +20,8 @@ pub enum HessianKind {
     Psd,
     /// The exact second derivative.
     Exact,
-    /// Between the two: the semi-definite blocks and this part (0 to 1) of what they leave out.
+    /// Between the two: the semi-definite blocks and this part (0 to 1) of what they leave out. Where
+    /// blocks are above what an energy with kinks has, so as to bound it, they stay so below 1.
     Part(f64),
 }
 

@@ -74,24 +74,27 @@ pub struct SeamLink {
 }
 
 impl GarmentMesh {
-    /// Leaves out the triangles of some panels, and the ties of seams that lead there; vertices
+    /// Leaves out some triangles, and the ties of seams to vertices that have none left; vertices
     /// stay, without triangles.
-    pub fn without_triangles_of(&self, left_out: &[bool]) -> Self {
-        let kept = |panel: u32| !left_out[panel as usize];
+    pub fn without_triangles(&self, left_out: &[bool]) -> Self {
         let mut mesh = self.clone();
         mesh.triangles.clear();
         mesh.triangle_panel.clear();
-        for (tri, &panel) in self.triangles.iter().zip(&self.triangle_panel) {
-            if kept(panel) {
+        let mut used = vec![false; self.uv.len()];
+        for (t, tri) in self.triangles.iter().enumerate() {
+            if !left_out[t] {
                 mesh.triangles.push(*tri);
-                mesh.triangle_panel.push(panel);
+                mesh.triangle_panel.push(self.triangle_panel[t]);
+                for v in tri {
+                    used[*v as usize] = true;
+                }
             }
         }
         for seam in &mut mesh.seams {
             seam.links.retain(|l| {
                 [l.vertex, l.edge[0], l.edge[1]]
                     .iter()
-                    .all(|&v| kept(self.vertex_panel[v as usize]))
+                    .all(|&v| used[v as usize])
             });
         }
         mesh

@@ -91,6 +91,15 @@ impl YarnMesh {
                 return refuse(format!("node {k} at ({}, {}, {lift})", uv.x, uv.y));
             }
         }
+        if ![0, nodes].contains(&self.outside.len()) {
+            return refuse(format!(
+                "outside has {} entries, must have none or {nodes}",
+                self.outside.len()
+            ));
+        }
+        if let Some(bad) = self.across.iter().find(|a| a.node as usize >= nodes) {
+            return refuse(format!("across: node {} of {nodes}", bad.node));
+        }
         Ok(())
     }
 
@@ -142,7 +151,8 @@ impl YarnMesh {
                 .windows(2)
                 .filter(|w| w[0].group != w[1].group)
                 .count();
-            if stack.is_empty() || changes > 1 || (stack.len() > 1 && changes == 0) {
+            let beside = stack.len() > 1 && changes == 0;
+            if changes > 1 || (beside && self.is_inside(node as u32)) {
                 return refuse(format!(
                     "node {node}: {} strands in {} groups",
                     stack.len(),
@@ -154,13 +164,37 @@ impl YarnMesh {
     }
 
     /// Whether the two incidences follow each other in one yarn.
-    fn neighbours(&self, a: u32, b: u32) -> bool {
+    pub(super) fn neighbours(&self, a: u32, b: u32) -> bool {
         let total = self.incidences.len() as u32;
         if a >= total || b >= total || a.abs_diff(b) != 1 {
             return false;
         }
         // no yarn begins at the later of the two
         self.starts.binary_search(&a.max(b)).is_err()
+    }
+
+    /// Whether a yarn goes from node `q` to node `other` without passing another.
+    pub(super) fn beside(&self, q: u32, other: u32) -> bool {
+        (q as usize) < self.uv.len()
+            && self.stack(q as usize).iter().any(|s| {
+                let i = s.incidence;
+                [i.checked_sub(1), i.checked_add(1)]
+                    .into_iter()
+                    .flatten()
+                    .any(|n| self.neighbours(i, n) && self.incidences[n as usize].node == other)
+            })
+    }
+
+    /// The strand that runs from a wing's end through the nodes `near` and `far`: which way along
+    /// the yarn, and its incidence at `near`.
+    pub(super) fn strand(&self, wing: u32, near: u32, far: u32) -> Option<(i32, u32)> {
+        let node = |i: u32| self.incidences[i as usize].node;
+        [-1, 1].into_iter().find_map(|step| {
+            let at = wing.checked_add_signed(step)?;
+            let beyond = at.checked_add_signed(step)?;
+            let runs = self.neighbours(wing, at) && self.neighbours(at, beyond);
+            (runs && node(at) == near && node(beyond) == far).then_some((step, at))
+        })
     }
 
     fn check_contacts(&self) -> Result<()> {
@@ -186,23 +220,10 @@ impl YarnMesh {
         for (k, wrap) in self.wraps.iter().enumerate() {
             let [q0, q1] = wrap.axis;
             // a wing's strand runs through both nodes of the axis and on to the wing
-            let strand = |wing: u32, near: u32, far: u32| {
-                [wing.checked_sub(1), wing.checked_add(1)]
-                    .into_iter()
-                    .flatten()
-                    .filter(|at| self.neighbours(*at, wing))
-                    .find(|at| {
-                        let beyond = if *at < wing {
-                            at.checked_sub(1)
-                        } else {
-                            at.checked_add(1)
-                        };
-                        let node = |k: u32| self.incidences[k as usize].node;
-                        node(*at) == near
-                            && beyond.is_some_and(|b| self.neighbours(b, *at) && node(b) == far)
-                    })
-            };
-            let (a, b) = (strand(wrap.wings[0], q0, q1), strand(wrap.wings[1], q1, q0));
+            let (a, b) = (
+                self.strand(wrap.wings[0], q0, q1).map(|s| s.1),
+                self.strand(wrap.wings[1], q1, q0).map(|s| s.1),
+            );
             let apart = match (a, b) {
                 (Some(a), Some(b)) => a != b && !self.neighbours(a, b),
                 _ => false,
@@ -217,19 +238,7 @@ impl YarnMesh {
     fn check_crossings(&self) -> Result<()> {
         for (k, corner) in self.corners.iter().enumerate() {
             let [q, a, b] = corner.nodes;
-            let beside = |q: u32, other: u32| {
-                (q as usize) < self.uv.len()
-                    && self.stack(q as usize).iter().any(|s| {
-                        let i = s.incidence;
-                        [i.checked_sub(1), i.checked_add(1)]
-                            .into_iter()
-                            .flatten()
-                            .any(|n| {
-                                self.neighbours(i, n) && self.incidences[n as usize].node == other
-                            })
-                    })
-            };
-            if a == b || !beside(q, a) || !beside(q, b) || !(corner.length > 0.0) {
+            if a == b || !self.beside(q, a) || !self.beside(q, b) || !(corner.length > 0.0) {
                 return refuse(format!("corner {k}: {corner:?}"));
             }
         }

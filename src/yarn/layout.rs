@@ -103,7 +103,9 @@ impl YarnMesh {
             + size_of_val(&self.stitch_springs[..])
             + size_of_val(&self.corners[..])
             + size_of_val(&self.spacings[..])
-            + size_of_val(&self.ties[..]);
+            + size_of_val(&self.ties[..])
+            + size_of_val(&self.across[..])
+            + size_of_val(&self.outside[..]);
         Counts {
             nodes: self.uv.len(),
             yarns: self.yarn_count(),

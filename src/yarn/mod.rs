@@ -11,14 +11,17 @@ mod cut;
 mod knit;
 pub mod layout;
 pub mod material;
+pub mod part;
 mod piece;
 mod region;
 mod rods;
 mod stitch;
+pub mod topology;
 mod weave;
 
 pub use layout::{Cell, Layout, lay};
 pub use material::YarnMaterial;
+pub use topology::Topology;
 
 use crate::math::Vec2;
 
@@ -54,6 +57,11 @@ pub struct YarnMesh {
     pub spacings: Vec<Spacing>,
     /// Nodes held at points of other yarns' segments: yarn ends at the rods of seams.
     pub ties: Vec<Tie>,
+    /// Places of the rods' nodes on the other side of their seams.
+    pub across: Vec<Across>,
+    /// Nodes that are there only because energies of other nodes reach them; empty where there are
+    /// none, as in whole panels. See [`part`].
+    pub outside: Vec<bool>,
 }
 
 /// Yarns and what they are made of.
@@ -63,6 +71,10 @@ pub struct Yarns {
     pub mesh: YarnMesh,
     /// One for each fabric of the garment.
     pub materials: Vec<YarnMaterial>,
+    /// Each passage's number among the laid ones.
+    pub passages: Vec<u32>,
+    /// Nodes that the last nodes of the mesh came out of, one for each.
+    pub split: Vec<u32>,
 }
 
 impl Yarns {
@@ -161,10 +173,37 @@ pub struct Tie {
     pub length: f64,
 }
 
+/// Where a node of a seam's rod, which lies on one side of the seam, lies on the other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Across {
+    /// The node.
+    pub node: u32,
+    /// Panel of the other side.
+    pub panel: u32,
+    /// Flat coordinates in it [m].
+    pub uv: Vec2,
+}
+
 impl YarnMesh {
+    /// Whether a node is simulated for its own sake.
+    pub fn is_inside(&self, node: u32) -> bool {
+        !self.outside.get(node as usize).copied().unwrap_or(false)
+    }
+
+    /// Whether an energy over these nodes exists: whether one of them is inside.
+    pub fn reaches(&self, nodes: &[u32]) -> bool {
+        nodes.iter().any(|n| self.is_inside(*n))
+    }
+
     /// Number of yarns.
     pub fn yarn_count(&self) -> usize {
         self.yarn_fabric.len()
+    }
+
+    /// Panel of the first node of a yarn.
+    pub fn panel_of(&self, y: usize) -> usize {
+        let first = self.incidences[self.starts[y] as usize].node;
+        self.node_panel[first as usize] as usize
     }
 
     /// Incidences of one yarn, in its order.

@@ -6,7 +6,7 @@
 
 use super::builder::{Builder, EdgeNode, Place};
 use super::layout::yarns_of;
-use super::{Family, Tie};
+use super::{Across, Family, Tie};
 use crate::error::Result;
 use crate::pattern::{Garment, Seam};
 
@@ -63,6 +63,21 @@ fn rod(
     let first = builder.mesh.uv.len() as u32;
     for point in segment.points_at(&fractions) {
         builder.node(side.panel, point, 0.0);
+    }
+    let other = sides[1 - along];
+    let segments = garment.panels[other.panel as usize].segments()?;
+    if let Some(segment) = segments.get(other.edge as usize) {
+        let mut points = segment.points_at(&fractions);
+        if !seam.same_direction {
+            points.reverse();
+        }
+        for (node, uv) in (first..).zip(points) {
+            builder.mesh.across.push(Across {
+                node,
+                panel: other.panel,
+                uv,
+            });
+        }
     }
     for k in 0..=pieces as u32 {
         builder.pass(first + k, Place::default(), 1.0);

@@ -10,6 +10,7 @@ import pytest
 import scenes
 from master import Fmu
 
+SCENES = {"hung": scenes.hung(), "moving": scenes.moving(), "woven": scenes.woven()}
 PROGRAM = os.environ["TOILE_PROGRAM"]
 
 
@@ -36,7 +37,7 @@ def folder(tmp_path_factory):
 def archives(folder):
     """Paths by (scene, version)."""
     made = {}
-    for name, scene in [("hung", scenes.hung()), ("moving", scenes.moving())]:
+    for name, scene in SCENES.items():
         for version in (2, 3):
             # the file's name decides the model's: one folder each
             out = folder / f"{name}{version}" / "cloth.fmu"
@@ -64,6 +65,6 @@ def fmu3(unpacked):
     return unpacked["hung", 3]
 
 
-@pytest.fixture(params=[("hung", 3), ("hung", 2), ("moving", 3), ("moving", 2)], ids=str)
+@pytest.fixture(params=[(name, version) for name in SCENES for version in (3, 2)], ids=str)
 def any_fmu(request, unpacked):
     return unpacked[request.param]

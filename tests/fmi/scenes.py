@@ -65,3 +65,44 @@ def moving():
         ],
         pins=[{"panel": "sheet", "uv": [-0.3, -0.3], "until": 0.055}],
     )
+
+
+def woven():
+    """A patch of plain weave, every yarn simulated, that falls onto a drum."""
+    size = 0.04
+    corners = [[0, 0], [size, 0], [size, size], [0, size]]
+    garment = {
+        "toile_garment": 1,
+        "name": "Patch",
+        "edge_length": 0.01,
+        "fabrics": [
+            {"name": "burlap", "yarns": {"weave": "plain", "warp_pitch": 0.005, "radius": 0.001}}
+        ],
+        "panels": [
+            {
+                "name": "patch",
+                "fabric": "burlap",
+                "placement": {"translation": [0, 0, 0], "rotation_deg": [-90, 0, 0]},
+                "vertices": corners,
+                "edges": [[0, 1], [1, 2], [2, 3], [3, 0]],
+            }
+        ],
+        "blend_regions": [
+            {"panel": "patch", "polygon": [[-1, -1], [1, -1], [1, 1], [-1, 1]]}
+        ],
+    }
+    return {
+        "toile": 1,
+        "name": "Woven patch",
+        "garment": garment,
+        "bodies": [
+            {
+                "name": "drum", "shape": "capsule", "radius": 0.02, "half_length": 0.1,
+                "pose": {"position": [0.02, -0.024, -0.02]},
+            }
+        ],
+        "probes": [{"name": "middle", "panel": "patch", "uv": [0.02, 0.02]}],
+        # yarns slide out of the falling patch: see docs/yarns.md for what self-contact makes of that
+        "numbers": {"solver.newton.relative_tolerance": 0.01, "contact.self.enabled": 0},
+        "run": {"drape": False, "duration": 0.3, "dt": 0.01},
+    }

@@ -92,6 +92,25 @@ def test_lost_worker_costs_its_run_only_in_the_report(archives):
     assert results[0].value is None and "Broken" in results[0].error
 
 
+def test_lost_worker_does_not_take_the_other_runs_along(archives, alone):
+    runs = [*RUNS, {"fabric.cotton_lawn.density": DEADLY}]
+    results = toile_fmu.sweep(
+        archives["hung", 3], runs, [*NAMES, "fabric.cotton_lawn.density"], 0.05, 0.01,
+        evaluate=die_of_density, workers=2, scheduler="processes", progress=None,
+    )
+    assert results[-1].value is None and "Broken" in results[-1].error
+    assert check(results[:-1]) == alone
+
+
+DEADLY = 0.123
+
+
+def die_of_density(outputs):
+    if outputs.pop("fabric.cotton_lawn.density") == DEADLY:
+        os._exit(3)
+    return outputs
+
+
 def die(_outputs):
     os._exit(3)
 

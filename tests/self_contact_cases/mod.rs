@@ -119,6 +119,7 @@ pub(crate) fn state(positions: Vec<Vec3>) -> State {
         time: 0.0,
         velocities: vec![Vec3::zeros(); positions.len()],
         positions,
+        topology: Default::default(),
         u: Vec::new(),
         u_rates: Vec::new(),
         sliding: Vec::new(),

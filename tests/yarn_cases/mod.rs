@@ -297,6 +297,7 @@ pub fn empty(blocks: Vec<Vec3>) -> State {
         gravity: WORLD.gravity,
         wind: Vec3::zeros(),
         pressure: 0.0,
+        topology: Default::default(),
         u: Vec::new(),
         u_rates: Vec::new(),
         sliding: Vec::new(),

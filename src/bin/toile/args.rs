@@ -47,6 +47,14 @@ pub(crate) enum Command {
         #[arg(long, value_name = "SVG")]
         out: PathBuf,
     },
+    /// Drapes a scene with blend regions by several models and compares them: error against time.
+    Report {
+        #[command(flatten)]
+        scene: SceneArgs,
+        /// Folder for report.json, report.csv and report.html; made if it is not there.
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+    },
     /// Draws model files: front, side and back beside each other, y up.
     Picture {
         /// Garment (OBJ, metres); each connected piece gets its own colour.
@@ -74,6 +82,10 @@ pub(crate) struct SceneArgs {
     /// Factor from the body file's coordinates to metres.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
     pub(crate) body_scale: f64,
+    /// Where the body's origin stands [m]. Garment files place their panels around the body that they
+    /// were drawn for; another body may have its origin elsewhere.
+    #[arg(long, value_name = "X,Y,Z", value_parser = offset, requires = "body", allow_hyphen_values = true)]
+    pub(crate) body_offset: Option<[f64; 3]>,
     /// Target edge length of every panel [m].
     #[arg(long, value_name = "M")]
     pub(crate) edge_length: Option<f64>,
@@ -127,6 +139,16 @@ pub(crate) struct FmuArgs {
     /// No progress.
     #[arg(long)]
     pub(crate) quiet: bool,
+}
+
+fn offset(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Option<Vec<f64>> = text
+        .split(',')
+        .map(|n| n.trim().parse().ok().filter(|v: &f64| v.is_finite()))
+        .collect();
+    numbers
+        .and_then(|n| n.try_into().ok())
+        .ok_or_else(|| format!("'{text}' is not X,Y,Z: three numbers"))
 }
 
 fn library(text: &str) -> Result<(String, PathBuf), String> {

@@ -6,7 +6,7 @@ use crate::output::{Done, err, file, out};
 use crate::run::bar;
 use std::path::PathBuf;
 use toile::error::{Error, Result};
-use toile::fmi::collect::Overrides;
+use toile::fmi::collect::{AddedBody, Overrides};
 use toile::fmi::package::{Options, package};
 use toile::fmi::platform::{Platform, Version};
 use toile::scene::{THREADS, files};
@@ -20,7 +20,11 @@ pub(crate) fn fmu(args: &FmuArgs) -> Done {
     let overrides = Overrides {
         edge_length: args.scene.edge_length,
         numbers,
-        body: args.scene.body.clone().map(|b| (b, args.scene.body_scale)),
+        body: args.scene.body.clone().map(|file| AddedBody {
+            file,
+            scale: args.scene.body_scale,
+            position: args.scene.body_offset.unwrap_or_default(),
+        }),
     };
     let stem = args.out.file_stem().unwrap_or_default();
     let options = Options {

@@ -24,14 +24,16 @@ fn apply(scene: &mut Scene, args: &SceneArgs) -> Result<()> {
                 e.at(path.display())
             }
         })?;
-        scene.bodies.push(SceneBody {
+        let mut body = SceneBody {
             name: path
                 .file_stem()
                 .map_or_else(|| "body".into(), |s| s.to_string_lossy().into_owned()),
             body,
             contact: Default::default(),
             motion: BodyMotion::default(),
-        });
+        };
+        body.shift(args.body_offset.unwrap_or_default().into());
+        scene.bodies.push(body);
     }
     if let Some(length) = args.edge_length {
         scene.set_edge_length(length)?;
@@ -94,6 +96,11 @@ pub(crate) fn info(args: &SceneArgs) -> Done {
     }
     row("vertices", info.vertices.to_string());
     row("triangles", info.triangles.to_string());
+    if info.yarn_nodes > 0 {
+        row("active triangles", info.active_triangles.to_string());
+        row("yarn nodes", info.yarn_nodes.to_string());
+        row("carried nodes", info.carried_nodes.to_string());
+    }
     row("unknowns", info.unknowns.to_string());
     row(
         "smallest angle",

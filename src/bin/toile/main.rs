@@ -9,6 +9,7 @@ mod fmu;
 mod info;
 mod output;
 mod picture;
+mod report;
 mod run;
 mod summary;
 mod yarns;
@@ -41,6 +42,7 @@ fn main() -> ExitCode {
         }
         Command::Mannequin { out, cell } => info::mannequin(out, *cell),
         Command::Yarns { scene, out } => yarns::yarns(scene, out),
+        Command::Report { scene, out } => report::report(scene, out),
         Command::Picture {
             garment,
             body,

@@ -55,8 +55,8 @@ impl Summary {
         let mut doubts = Vec::new();
         if last.max_seam_gap > OPEN_SEAM {
             doubts.push(format!(
-                "a seam is open by {:.1} mm: the garment is not sewn shut, as where it is placed wrongly or \
-                 too tight",
+                "a seam is open by {:.1} mm: the garment is not sewn shut, as where it is too tight or \
+                 placed for a body that stands elsewhere (--body-offset moves the body)",
                 1e3 * last.max_seam_gap
             ));
         }
@@ -87,7 +87,10 @@ impl Summary {
         put("triangles", json!(info.triangles));
         put("yarn_nodes", json!(info.yarn_nodes));
         put("yarns", json!(info.yarns));
+        put("full_nodes", json!(info.yarn_nodes - info.carried_nodes));
         put("hybrid_nodes", json!(0));
+        put("carried_nodes", json!(info.carried_nodes));
+        put("active_triangles", json!(info.active_triangles));
         put("unknowns", json!(info.unknowns));
         put("min_angle_degrees", json!(info.min_angle.to_degrees()));
         put("steps", json!(self.steps));

@@ -25,6 +25,11 @@ impl Table {
                 EnergyPart::Contact,
                 "energy of contacts with bodies and of cloth with itself",
             ),
+            (
+                "yarn",
+                EnergyPart::Yarn,
+                "energy of yarns: stretch, bending, contacts, friction",
+            ),
             ("total", EnergyPart::Total, "sum of these energies"),
         ];
         for (name, part, doc) in parts {
@@ -216,6 +221,29 @@ impl Table {
         ];
         for (name, quantity, unit, doc) in arrays {
             self.push(name, quantity, unit, doc).dimensions = vec![vertices, three];
+        }
+        if sizes.nodes > 0 {
+            let nodes = self.count(
+                "yarn.node.capacity".into(),
+                sizes.nodes,
+                "room for nodes of yarns",
+            );
+            let v = self.push(
+                "yarn.node.count",
+                Quantity::NodeCount,
+                "",
+                "number of the yarns' nodes",
+            );
+            v.kind = Kind::Int32;
+            v.variability = Variability::Discrete;
+            (v.min, v.max) = (Some(0.0), Some(sizes.nodes as f64));
+            self.push(
+                "yarn.node.position",
+                Quantity::Nodes,
+                "m",
+                "positions of the yarns' nodes, zeros from yarn.node.count on, shape [yarn.node.capacity, 3]",
+            )
+            .dimensions = vec![nodes, three];
         }
         for (b, (body, name)) in scene.bodies.iter().zip(body_names(scene)).enumerate() {
             if let Some(first) = body.motion.frames.first() {

@@ -107,6 +107,16 @@ pub fn read_garment(
         fabrics,
         blend_regions,
     };
+    for panel in &garment.panels {
+        // a loop that is not closed is found by the garment's check
+        if panel.signed_outline_area().is_ok_and(|area| area < 0.0) {
+            notes.push(format!(
+                "panel '{}': its outline runs clockwise, so that its outside is the side seen from -z before it is \
+                 placed",
+                panel.name
+            ));
+        }
+    }
     Ok((garment, notes))
 }
 

@@ -62,15 +62,43 @@ pub(super) fn probe(
     })
 }
 
+/// Reads a yarn that is held, whole or at an end.
+fn yarn(object: &Object<'_>, yarn: &Node<'_>) -> Result<PinPlace> {
+    for other in ["panel", "uv", "edge"] {
+        if let Some(other) = object.get(other) {
+            return Err(other.error("a yarn is named by its number alone"));
+        }
+    }
+    let end = match object.get("end") {
+        None => None,
+        Some(end) => match end.text()? {
+            "first" => Some(0),
+            "last" => Some(1),
+            _ => return Err(end.error("must be \"first\" or \"last\"")),
+        },
+    };
+    Ok(PinPlace::Yarn {
+        yarn: yarn.index()?,
+        end,
+    })
+}
+
 /// Reads a pin; panel and edge are looked up where the garment is known.
 pub(super) fn pin(node: &Node<'_>, garment: Option<&Garment>) -> Result<ScenePin> {
     let object = node.object()?;
     object.only(schema::PIN)?;
-    let (panel, place) = place(&object, garment)?;
+    let (panel, place) = match object.get("yarn") {
+        Some(yarn) => (0, self::yarn(&object, &yarn)?),
+        None => match object.get("end") {
+            Some(end) => return Err(end.error("goes with yarn alone")),
+            None => place(&object, garment)?,
+        },
+    };
+    let several = matches!(place, PinPlace::Edge(_) | PinPlace::Yarn { end: None, .. });
     let target = match object.get("target") {
         None => None,
-        Some(target) if matches!(place, PinPlace::Edge(_)) => {
-            return Err(target.error("an edge has no single target; use motion"));
+        Some(target) if several => {
+            return Err(target.error("an edge or a yarn has no single target; use motion"));
         }
         Some(target) => Some(target.vec3()?.into()),
     };

@@ -31,6 +31,7 @@ impl Engine {
                     center: &engine.center,
                 },
                 fixed: &engine.fixed,
+                riders: &engine.system.points.riders,
                 idle: &engine.idle,
                 workers: &engine.workers,
             };
@@ -51,8 +52,9 @@ impl Engine {
                 term.accept(at, state);
             }
             let workers = engine.workers.clone();
-            engine.system.follow_contacts(state, &workers);
-        })
+            engine.system.follow_contacts(false, state, &workers)?;
+            Ok(())
+        })?
     }
 
     /// Sum of all energies of the present state [J].
@@ -107,7 +109,7 @@ impl Engine {
             body.target = body.pose;
             body.target_vertices.clear();
         }
-        let mut changed = self.system.set_sliding(&state.sliding)?;
+        let mut changed = self.system.take_contacts(state)?;
         self.system.bodies.prepare(&still, 1.0, &self.workers)?;
         let bodies = self.system.bodies.clone();
         let world = World {

@@ -31,7 +31,8 @@
 //!
 //! # Yarns
 //!
-//! A node's sphere has the radius of the yarn. Segments are ways like edges; nodes of one panel are
+//! A node's sphere has the radius of the yarn. Segments are ways like edges, and so is the way from a node that rides
+//! on a triangle to the triangle's vertices; a node and another point of its panel are
 //! neighbours if the straight line between them is short, since yarns of one layer touch.
 
 use crate::cloth::Cloth;
@@ -109,7 +110,16 @@ impl Spheres {
             starts: vec![0],
             partners: Vec::new(),
         };
-        spheres.exclude(&Flat::new(cloth, yarns), &ways(cloth, &edges, yarns));
+        let mut ways = ways(cloth, &edges, yarns);
+        for rider in points.riders.list() {
+            let place = |v: u32| uv[v as usize];
+            let carried = rider.vertices.iter().zip(&rider.weights);
+            let own: Vec2 = carried.map(|(v, w)| place(*v) * *w).sum();
+            for v in rider.vertices {
+                ways.push((rider.point, v, (place(v) - own).norm()));
+            }
+        }
+        spheres.exclude(&Flat::new(cloth, yarns), &ways);
         Ok(spheres)
     }
 
@@ -226,10 +236,10 @@ impl<'a> Flat<'a> {
         }
     }
 
-    /// Length of the straight line between points of one panel, and whether both are nodes.
+    /// Length of the straight line between points of one panel, and whether one is a node.
     fn line(&self, a: u32, b: u32) -> Option<(f64, bool)> {
         let (a, b) = (self.place(a), self.place(b));
-        (a.0 == b.0).then(|| ((b.1 - a.1).norm(), a.2 && b.2))
+        (a.0 == b.0).then(|| ((b.1 - a.1).norm(), a.2 || b.2))
     }
 }
 
@@ -244,8 +254,13 @@ fn ways(cloth: &Cloth, edges: &[[u32; 2]], yarns: Option<&Yarns>) -> Vec<(u32, u
         ways.push((link.vertex, e0, link.t.abs() * whole));
         ways.push((link.vertex, e1, (1.0 - link.t).abs() * whole));
     }
-    if let Some(Yarns { mesh, .. }) = yarns {
+    if let Some(Yarns { mesh, split, .. }) = yarns {
         let first = uv.len() as u32;
+        // yarns that have parted were in contact, and lie in one place at first
+        let laid = (mesh.uv.len() - split.len()) as u32;
+        for (new, origin) in (laid..).zip(split) {
+            ways.push((first + origin, first + new, 0.0));
+        }
         for y in 0..mesh.yarn_count() {
             for pair in mesh.yarn(y).windows(2) {
                 let du = pair[1].u - pair[0].u;

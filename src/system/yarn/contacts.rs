@@ -2,6 +2,8 @@
 
 use super::YarnOptions;
 use super::compression::{Compression, YarnPlace};
+use super::passing::{Passing, passings};
+use super::release::{Nearness, nearness, release};
 use super::slip::{self, SlipRule};
 use super::springs::{self, StrandFriction};
 use super::stack::StackRule;
@@ -11,8 +13,8 @@ use crate::system::state::State;
 use crate::yarn::Yarns;
 use std::sync::Arc;
 
-/// Length of a segment over its laid length below which contacts slide no nearer to each other: the
-/// yarns' thickness, or the knot at a yarn's end, holds them apart.
+/// Length of a segment over its laid length below which contacts that hold each other slide no nearer: the
+/// yarns' thickness keeps them apart.
 const JAMMED: f64 = 0.2;
 
 /// Where yarns may slide.
@@ -29,7 +31,9 @@ pub enum Sliding {
 
 /// Normal forces and friction of all contacts.
 pub struct Contacts {
+    laid: Arc<Yarns>,
     yarns: Arc<Yarns>,
+    passings: Vec<Passing>,
     compression: Compression,
     frictions: Vec<StrandFriction>,
     rule: SlipRule,
@@ -37,21 +41,30 @@ pub struct Contacts {
 }
 
 impl Contacts {
-    /// Rest data of the contacts.
-    pub fn new(yarns: Arc<Yarns>, options: &YarnOptions) -> Result<Self> {
+    /// Rest data of the contacts of yarns that were laid otherwise, or so.
+    pub fn new(laid: Arc<Yarns>, yarns: Arc<Yarns>, options: &YarnOptions) -> Result<Self> {
         let (mesh, materials) = (&yarns.mesh, &yarns.materials);
         Ok(Self {
             compression: Compression::new(mesh, materials, options, StackRule::default())?,
             frictions: springs::frictions(mesh, materials)?,
             rule: SlipRule::default(),
             held: Vec::new(),
+            passings: passings(mesh),
+            laid,
             yarns,
         })
     }
 
-    /// Takes the normal forces of an accepted step and says which yarns slide in the next. Yarns do
-    /// not slide at nodes that are held.
-    pub fn follow(&mut self, sliding: Sliding, state: &mut State, workers: &Workers) {
+    /// Takes the normal forces of an accepted step and says which yarns slide in the next, and which contacts they
+    /// have left, if any may be (`releases`): then the yarns as they are now are returned, for which this is to be made
+    /// anew. Yarns do not slide at nodes that are held.
+    pub fn follow(
+        &mut self,
+        sliding: Sliding,
+        releases: bool,
+        state: &mut State,
+        workers: &Workers,
+    ) -> Result<Option<Yarns>> {
         let mesh = &self.yarns.mesh;
         let first = state.positions.len() - mesh.uv.len();
         self.held.clear();
@@ -87,8 +100,7 @@ impl Contacts {
         }
         for y in 0..mesh.yarn_count() {
             for i in mesh.starts[y] as usize + 1..mesh.starts[y + 1] as usize {
-                let laid = mesh.incidences[i].u - mesh.incidences[i - 1].u;
-                if state.u[i] - state.u[i - 1] < JAMMED * laid {
+                if self.is_jammed(i - 1, releases, state) {
                     next[i - 1] &= forces[i - 1] < 0.0 && state.u_rates[i - 1] <= 0.0;
                     next[i] &= forces[i] > 0.0 && state.u_rates[i] >= 0.0;
                 }
@@ -104,6 +116,31 @@ impl Contacts {
                 }
             }
             state.sliding = after;
+        }
+        if !releases {
+            return Ok(None);
+        }
+        // what triangles carry does not come off either
+        for (node, held) in (0..).zip(&mut self.held) {
+            *held |= !mesh.is_inside(node);
+        }
+        release(&self.laid, &self.yarns, &self.passings, &self.held, state)
+    }
+
+    /// Whether the passages `i` and `i + 1` of a yarn do not slide nearer to each other.
+    fn is_jammed(&self, i: usize, releases: bool, state: &State) -> bool {
+        let passages = [i, i + 1].map(|i| &self.yarns.mesh.incidences[i]);
+        let mesh = &self.yarns.mesh;
+        let stays = |node: u32| self.held[node as usize] || !mesh.is_inside(node);
+        let held = passages.iter().any(|p| stays(p.node));
+        let passing = self.passings[i];
+        if held || passing == Passing::Kept {
+            return state.u[i + 1] - state.u[i] < JAMMED * (passages[1].u - passages[0].u);
+        }
+        match nearness(&self.yarns, i, passing, state) {
+            Nearness::Apart => false,
+            Nearness::Gripped => true,
+            Nearness::Pulled => !releases,
         }
     }
 }

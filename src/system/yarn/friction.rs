@@ -12,7 +12,9 @@
 //! `lambda` between them. `lambda` is that of the last accepted step, so that this is a convex potential within
 //! a step; afterwards, and only after an accepted step, a slipping anchor is drawn along to the
 //! distance `f/k_f`. Anchors are in the State, one for each contact and yarn. The Hessian is `k_f` in stick and 0
-//! in slip and is never part of stiffness-proportional damping. Viscous resistance is `d_f/(2 dt) (m - m0)^2` in `u`
+//! in slip; where it is not to be exact, slip takes `f/|m - m_a|`, the curvature of the parabola that touches the
+//! potential there and lies above it: a correction that turns a slip around then meets the friction it
+//! will have. It is never part of stiffness-proportional damping. Viscous resistance is `d_f/(2 dt) (m - m0)^2` in `u`
 //! alone. SI units.
 
 use super::super::state::{State, StrandState};
@@ -90,13 +92,20 @@ impl Rubbing {
         }
     }
 
-    /// Derivatives of the energy.
-    fn force(&self, m: f64) -> [f64; 2] {
-        let force = self.stiffness * (m - self.anchor);
-        if force.abs() <= self.bound {
-            [force, self.stiffness]
+    /// Derivative of the energy.
+    fn force(&self, m: f64) -> f64 {
+        (self.stiffness * (m - self.anchor)).clamp(-self.bound, self.bound)
+    }
+
+    /// Second derivative, or the curvature of the majorant.
+    fn curvature(&self, m: f64, exactness: f64) -> f64 {
+        let off = (m - self.anchor).abs();
+        if self.stiffness * off <= self.bound {
+            self.stiffness
+        } else if exactness == 1.0 {
+            0.0
         } else {
-            [self.bound.copysign(force), 0.0]
+            self.bound / off
         }
     }
 }
@@ -113,11 +122,11 @@ impl Kernel<1> for Rubbing {
 
     fn gradient(&self, at: &Local<'_, 1>, out: &mut [f64; 1]) {
         let moved = at.q[0] - at.q0[0];
-        out[0] = self.force(at.q[0])[0] + self.viscosity * at.inv_dt * moved;
+        out[0] = self.force(at.q[0]) + self.viscosity * at.inv_dt * moved;
     }
 
-    fn hessian(&self, at: &Local<'_, 1>, _: f64, out: &mut Lower<1>) {
-        out[0][0] = self.force(at.q[0])[1] + self.viscosity * at.inv_dt;
+    fn hessian(&self, at: &Local<'_, 1>, exactness: f64, out: &mut Lower<1>) {
+        out[0][0] = self.curvature(at.q[0], exactness) + self.viscosity * at.inv_dt;
     }
 
     fn begin(&mut self, _: &Local<'_, 1>, _: &[f64; 1], state: &State) {
@@ -142,12 +151,12 @@ impl Kernel<2> for Rubbing {
     }
 
     fn gradient(&self, at: &Local<'_, 2>, out: &mut [f64; 2]) {
-        let force = self.force(at.q[0] - at.q[1])[0];
+        let force = self.force(at.q[0] - at.q[1]);
         *out = [force, -force];
     }
 
-    fn hessian(&self, at: &Local<'_, 2>, _: f64, out: &mut Lower<2>) {
-        let k = self.force(at.q[0] - at.q[1])[1];
+    fn hessian(&self, at: &Local<'_, 2>, exactness: f64, out: &mut Lower<2>) {
+        let k = self.curvature(at.q[0] - at.q[1], exactness);
         out[0][0] = k;
         out[1][0] = -k;
         out[1][1] = k;

@@ -16,6 +16,8 @@ pub mod gravity;
 pub mod inertia;
 pub mod kernel;
 pub(super) mod normals;
+pub mod passing;
+pub mod release;
 pub mod shear;
 pub mod slip;
 pub mod spacing;

@@ -1,10 +1,17 @@
-//! Least length of yarn between two neighbouring crossings: `V = k_c/2 L (du - d)^2` where `du < d` (Cirio
-//! et al. 2014, contact between adjacent parallel yarns).
+//! Least length of yarn between two neighbouring crossings: `V = k_c L R(d - du)` where `du < d` (Cirio et al. 2014,
+//! contact between adjacent parallel yarns).
 //!
-//! Acts on material coordinates alone; `L` is the length at rest. Damping acts on `min(du - d, 0)`, which is continuous
-//! where contact begins. `Psd` and `Exact` agree, but for the kink of the damping at `du = d`. SI units; `k_c` in N/m^2.
+//! Acts on material coordinates alone; `L` is the length at rest. Fibres pack before they resist (van Wyk 1946): the
+//! stiffness grows from zero over a quarter of `d` to `k_c L`, `R''(t) = t/w` up to `w = d/4` and 1 beyond, so that
+//! there is no kink where contact begins. Where contacts may come off, which they do in time alone, `d` is smaller in
+//! time than in relaxations. Damping acts on `min(du - d, 0)`. `Psd` and `Exact` agree, but for the kink of
+//! the damping at `du = d`. SI units; `k_c` in N/m^2.
 
+use super::angle::Jam;
 use super::kernel::{Kernel, Local, Lower};
+
+/// Part of the least length over which the stiffness grows.
+const SOFT: f64 = 0.25;
 
 /// Least length of one segment; scalars `(u0, u1)`.
 pub struct Spacing {
@@ -14,14 +21,35 @@ pub struct Spacing {
     pub least: f64,
     /// Stiffness-proportional damping [s].
     pub damping: f64,
+    /// Least length in steps in time [m], smaller where one contact may pass the other.
+    pub least_in_time: f64,
 }
 
 impl Spacing {
+    fn least(&self, at: &Local<'_, 2>) -> f64 {
+        if at.inv_dt > 0.0 {
+            self.least_in_time
+        } else {
+            self.least
+        }
+    }
+
     /// How far the length falls short (negative), now and since the start of the step.
     fn gap(&self, at: &Local<'_, 2>) -> (f64, f64) {
-        let gap = |q: &[f64; 2]| (q[1] - q[0] - self.least).min(0.0);
+        let least = self.least(at);
+        let gap = |q: &[f64; 2]| (q[1] - q[0] - least).min(0.0);
         let now = gap(at.q);
         (now, now - gap(at.q0))
+    }
+
+    /// `R` and its derivatives where the length falls short by `-gap`.
+    fn packing(&self, at: &Local<'_, 2>, gap: f64) -> [f64; 3] {
+        let jam = Jam {
+            factor: 2.0,
+            from: 0.0,
+            width: SOFT * self.least(at),
+        };
+        jam.at(-gap)
     }
 }
 
@@ -31,13 +59,14 @@ impl Kernel<2> for Spacing {
 
     fn value(&self, at: &Local<'_, 2>) -> f64 {
         let (now, since) = self.gap(at);
-        0.5 * self.stiffness * (now * now + self.damping * at.inv_dt * since * since)
+        let rate = self.damping * at.inv_dt;
+        self.stiffness * (self.packing(at, now)[0] + 0.5 * rate * since * since)
     }
 
     fn gradient(&self, at: &Local<'_, 2>, out: &mut [f64; 2]) {
         let (now, since) = self.gap(at);
         let force = if now < 0.0 {
-            self.stiffness * (now + self.damping * at.inv_dt * since)
+            self.stiffness * (self.damping * at.inv_dt * since - self.packing(at, now)[1])
         } else {
             0.0
         };
@@ -45,8 +74,9 @@ impl Kernel<2> for Spacing {
     }
 
     fn hessian(&self, at: &Local<'_, 2>, _: f64, out: &mut Lower<2>) {
-        if self.gap(at).0 < 0.0 {
-            let k = self.stiffness * (1.0 + self.damping * at.inv_dt);
+        let now = self.gap(at).0;
+        if now < 0.0 {
+            let k = self.stiffness * (self.packing(at, now)[2] + self.damping * at.inv_dt);
             out[0][0] = k;
             out[1][0] = -k;
             out[1][1] = k;

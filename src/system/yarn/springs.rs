@@ -8,6 +8,7 @@ use super::friction::Rubbing;
 use super::gravity::Weight;
 use super::inertia::Inertia;
 use super::kernel::{MAX_POSITIONS, MAX_SLIDES};
+use super::passing::{Passing, passings};
 use super::shear::{Shear, lock};
 use super::spacing::Spacing;
 use super::stitch::StitchLength;
@@ -18,9 +19,11 @@ use super::{YarnOptions, material_of};
 use crate::error::{Error, Result};
 use crate::yarn::{YarnMaterial, YarnMesh};
 
-/// Length of a segment that nothing else keeps apart, over its laid length, below which its ends
-/// press on each other.
+/// Length of a segment between contacts that hold each other and that nothing else keeps apart, over its laid
+/// length, below which they press on each other.
 const CLOSEST: f64 = 0.4;
+/// Same in time where contacts come off, over the yarn's radius: below what is left when they do.
+const LEFT: f64 = 0.15;
 
 /// How a strand rubs on its neighbours in the stack.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -55,7 +58,8 @@ fn yarns(mesh: &YarnMesh) -> Vec<u32> {
     out
 }
 
-/// Every run of `n` incidences that follow each other in a yarn, with the yarn's material.
+/// Every run of `n` incidences that follow each other in a yarn, with the yarn's material; only those
+/// with a node inside.
 fn runs<const N: usize>(
     mesh: &YarnMesh,
     materials: &[YarnMaterial],
@@ -67,7 +71,9 @@ fn runs<const N: usize>(
         for i in from..(to + 1).saturating_sub(N) {
             let incidences: [u32; N] = std::array::from_fn(|k| (i + k) as u32);
             let nodes = incidences.map(|i| mesh.incidences[i as usize].node);
-            f(incidences, nodes, m);
+            if mesh.reaches(&nodes) {
+                f(incidences, nodes, m);
+            }
         }
     }
     Ok(())
@@ -180,7 +186,12 @@ pub(super) fn spacings(
     let yarns = yarns(mesh);
     let mut out = Vec::with_capacity(mesh.incidences.len());
     let mut spaced = vec![false; mesh.incidences.len()];
+    let passings = passings(mesh);
     for spacing in &mesh.spacings {
+        // a loop can be pulled out
+        if passings[spacing.incidences[0] as usize] != Passing::Kept {
+            continue;
+        }
         spaced[spacing.incidences[0] as usize] = true;
         let m = material_of(
             mesh,
@@ -191,19 +202,25 @@ pub(super) fn spacings(
             stiffness: m.spacing * spacing.length,
             least: spacing.least,
             damping: m.damping_stiffness,
+            least_in_time: spacing.least,
         };
         out.push(stencil(&[], &spacing.incidences, kernel));
     }
-    // a contact may come near to the next one or to the end of its yarn, and not pass it
+    // a contact may come near to the next one, and not pass it
     for y in 0..mesh.yarn_count() {
         let m = material_of(mesh, materials, y)?;
         for i in mesh.starts[y] as usize + 1..mesh.starts[y + 1] as usize {
             let laid = mesh.incidences[i].u - mesh.incidences[i - 1].u;
-            if !spaced[i - 1] {
+            let nodes = [i - 1, i].map(|i| mesh.incidences[i].node);
+            if !spaced[i - 1] && mesh.reaches(&nodes) {
                 let kernel = Spacing {
                     stiffness: m.spacing * laid,
                     least: CLOSEST * laid,
                     damping: m.damping_stiffness,
+                    least_in_time: match passings[i - 1] {
+                        Passing::Kept => CLOSEST * laid,
+                        _ => (LEFT * m.radius).min(CLOSEST * laid),
+                    },
                 };
                 out.push(stencil(&[], &[i as u32 - 1, i as u32], kernel));
             }

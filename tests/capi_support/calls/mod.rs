@@ -16,7 +16,7 @@ use sims::{add_sim, change_sim, read_sim};
 use std::ffi::CString;
 use std::ptr;
 use toile::capi::*;
-use world::{World, filled, free, sane, start, state};
+use world::{World, filled, free, sane, start, start_yarns, state};
 
 /// How many calls of a sequence succeeded and failed.
 #[derive(Clone, Copy, Debug, Default)]
@@ -35,6 +35,10 @@ pub fn run(bytes: &[u8]) -> Tally {
     // most sequences get as far as a simulation
     if choices.below(4) != 0 {
         start(&mut world);
+    }
+    // yarns cost more than a square of eight triangles
+    if choices.once_in(64) {
+        start_yarns(&mut world);
     }
     for _ in 0..40 {
         if choices.bytes.is_empty() {

@@ -67,7 +67,15 @@ pub(super) fn change_sim(world: &World, choices: &mut Choices<'_>) -> toile_stat
     };
     let uv = choices.numbers(8);
     let status = unsafe {
-        match choices.below(14) {
+        match choices.below(16) {
+            14 => {
+                let nodes = choices.maybe(pins.as_ptr());
+                toile_sim_pin_yarn_nodes(sim, nodes, choices.count(3), targets)
+            }
+            15 => {
+                let nodes = choices.maybe(pins.as_ptr());
+                toile_sim_unpin_yarn_nodes(sim, nodes, choices.count(3))
+            }
             0..4 => {
                 // days of simulated time would be done, and take days
                 let dt = match choices.near(0.01) {
@@ -180,7 +188,18 @@ pub(super) fn read_sim(world: &World, choices: &mut Choices<'_>) -> toile_status
     let body = choices.index();
     let point = choices.numbers(3);
     let status = unsafe {
-        match choices.below(20) {
+        match choices.below(24) {
+            20 => toile_sim_yarn_forces(sim, out, capacity, needed),
+            21 => {
+                let mut changes = filled(toile_yarn_changes_init);
+                changes.struct_size = size(choices, changes.struct_size);
+                toile_sim_yarn_changes(sim, choices.maybe_mut(&mut changes))
+            }
+            22 => toile_sim_yarn_end(sim, body, choices.index(), choices.maybe_mut(&mut index)),
+            23 => {
+                let uv = choices.maybe(point.as_ptr());
+                toile_sim_locate_yarn_node(sim, body, uv, choices.maybe_mut(&mut index))
+            }
             0 => toile_sim_positions(sim, out, capacity, needed),
             1 => toile_sim_velocities(sim, out, capacity, needed),
             2 => toile_sim_normals(sim, out, capacity, needed),

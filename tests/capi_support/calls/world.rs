@@ -128,6 +128,43 @@ pub(super) fn start(world: &mut World) {
     }
 }
 
+/// A scrap of weave with a weft that is half pulled out.
+pub(super) fn start_yarns(world: &mut World) {
+    let text = r#"{"toile_garment": 1, "name": "scrap", "edge_length": 0.002,
+        "fabrics": [{"name": "y", "yarns":
+            {"weave": "plain", "warp_pitch": 0.001, "radius": 0.00025}}],
+        "panels": [{"name": "p", "fabric": "y",
+            "vertices": [[0, 0], [0.003, 0], [0.003, 0.003], [0, 0.003]],
+            "edges": [[0, 1], [1, 2], [2, 3], [3, 0]]}],
+        "blend_regions": [{"panel": "p", "polygon": [[-1, -1], [1, -1], [1, 1], [-1, 1]]}]}"#;
+    let (mut garment, mut sim) = (ptr::null_mut(), ptr::null_mut());
+    unsafe {
+        let (bytes, length) = (text.as_ptr().cast(), text.len());
+        let status = toile_garment_from_json(bytes, length, ptr::null(), &mut garment);
+        assert_eq!(status, TOILE_OK);
+        world.garments.push(garment);
+        assert_eq!(toile_sim_create(garment, ptr::null(), &mut sim), TOILE_OK);
+        world.sims.push(sim);
+        for yarn in 0..3 {
+            for end in 0..2 {
+                let mut node = 0;
+                sane(toile_sim_yarn_end(sim, yarn, end, &mut node));
+                sane(toile_sim_pin_yarn_nodes(sim, &node, 1, ptr::null()));
+            }
+        }
+        let mut node = 0;
+        assert_eq!(toile_sim_yarn_end(sim, 4, 1, &mut node), TOILE_OK);
+        for step in 1..=14 {
+            let target = [3e-3 + 1e-4 * f64::from(step), 1.5e-3, 0.0];
+            sane(toile_sim_pin_yarn_nodes(sim, &node, 1, target.as_ptr()));
+            sane(toile_sim_step(sim, 1e-3, ptr::null_mut()));
+        }
+        let mut changes = filled(toile_yarn_changes_init);
+        assert_eq!(toile_sim_yarn_changes(sim, &mut changes), TOILE_OK);
+        assert!(changes.passages_gone > 0, "{changes:?}");
+    }
+}
+
 pub(super) fn free(world: &World, choices: &mut Choices<'_>) -> toile_status {
     // the handle stays in the list: later calls meet it freed
     unsafe {

@@ -1,0 +1,44 @@
+//! `toile report`: one scene by several models, error against time.
+
+use crate::args::SceneArgs;
+use crate::info::load;
+use crate::output::{Done, Failure, err, file, out};
+use std::fmt::Write;
+use std::path::Path;
+
+pub(crate) fn report(args: &SceneArgs, dir: &Path) -> Done {
+    std::fs::create_dir_all(dir).map_err(|e| Failure {
+        code: 4,
+        text: format!("cannot make {}: {e}", dir.display()),
+    })?;
+    let scene = load(args)?;
+    let report = toile::report::run(&scene, &mut |name| err(&format!("{name}\n")))?;
+    let json = format!("{:#}\n", report.to_json());
+    file(&dir.join("report.json"), json.as_bytes())?;
+    file(&dir.join("report.csv"), report.to_csv().as_bytes())?;
+    file(&dir.join("report.html"), report.to_html().as_bytes())?;
+    let mut text = format!(
+        "{:<24} {:>9} {:>9} {:>9} {:>11} {:>8} {:>12}\n",
+        "model", "unknowns", "Newton", "seconds", "error [mm]", "height", "correlation"
+    );
+    for row in &report.rows {
+        let _ = write!(
+            text,
+            "{:<24} {:>9} {:>9} {:>9.2} ",
+            row.name, row.unknowns, row.newton_iterations, row.seconds
+        );
+        let _ = match row.deviation {
+            Some(d) => writeln!(
+                text,
+                "{:>11.4} {:>8.3} {:>12.4} {}",
+                1e3 * d.error,
+                d.height,
+                d.correlation,
+                if row.front { "front" } else { "" }
+            ),
+            None if row.reference => writeln!(text, "reference"),
+            None => writeln!(text, "{}", row.reason),
+        };
+    }
+    out(&text)
+}
