@@ -10,7 +10,12 @@ import pytest
 import scenes
 from master import Fmu
 
-SCENES = {"hung": scenes.hung(), "moving": scenes.moving(), "woven": scenes.woven()}
+SCENES = {
+    "hung": scenes.hung(),
+    "moving": scenes.moving(),
+    "woven": scenes.woven(),
+    "mixed": scenes.mixed(),
+}
 PROGRAM = os.environ["TOILE_PROGRAM"]
 
 

@@ -106,3 +106,21 @@ def woven():
         "numbers": {"solver.newton.relative_tolerance": 0.01, "contact.self.enabled": 0},
         "run": {"drape": False, "duration": 0.3, "dt": 0.01},
     }
+
+
+def mixed():
+    """A hung sheet of triangles, woven around its middle, with a ball that pushes it."""
+    garment = {
+        **SHEET,
+        "fabrics": [
+            {
+                **SHEET["fabrics"][0],
+                "yarns": {"weave": "plain", "warp_pitch": 0.01, "radius": 0.001},
+            }
+        ],
+        "blend_regions": [
+            {"panel": "sheet", "polygon": [[-0.1, -0.1], [0.1, -0.1], [0.1, 0.1], [-0.1, 0.1]]}
+        ],
+    }
+    numbers = {"solver.newton.relative_tolerance": 0.01, "contact.self.enabled": 0}
+    return hung(name="Mixed sheet", garment=garment, edge_length=0.05, numbers=numbers)

@@ -7,7 +7,7 @@ import zipfile
 import pytest
 
 import scenes
-from conftest import pack
+from conftest import SCENES, pack
 from master import Fmu
 
 lxml = pytest.importorskip("lxml.etree")
@@ -56,7 +56,7 @@ def test_fmpy_finds_no_problem(archives):
 def test_terminals_are_valid_and_name_variables(archives, unpacked):
     schema = fmpy.__path__[0] + "/schema/fmi3/fmi3TerminalsAndIcons.xsd"
     schema = lxml.XMLSchema(lxml.parse(schema))
-    for scene in ("hung", "moving", "woven"):
+    for scene in SCENES:
         fmu = unpacked[scene, 3]
         page = lxml.parse(str(fmu.folder / "terminalsAndIcons/terminalsAndIcons.xml"))
         assert schema.validate(page), schema.error_log
@@ -150,12 +150,13 @@ def test_structure_lists_every_output_once(any_fmu):
 
 def test_names_that_hosts_rely_on(any_fmu):
     assert "energy.yarn" in any_fmu.variables
-    if "Woven" in any_fmu.root.get("modelName"):
-        assert "yarn.node.count" in any_fmu.variables
-        assert ("yarn.node.position" in any_fmu.variables) == (any_fmu.version == 3)
+    name = any_fmu.root.get("modelName")
+    yarns = "Woven" in name or "Mixed" in name
+    assert ("yarn.node.count" in any_fmu.variables) == yarns
+    assert ("yarn.node.position" in any_fmu.variables) == (yarns and any_fmu.version == 3)
+    if "Woven" in name:
         return
-    assert "yarn.node.count" not in any_fmu.variables
-    body = "ball" if "Hung" in any_fmu.root.get("modelName") else "_2nd_capsule__turned"
+    body = "_2nd_capsule__turned" if "Moving" in name else "ball"
     for name in (
         f"body.{body}.position[1]", f"body.{body}.quaternion[4]", f"body.{body}.velocity[3]",
         f"body.{body}.force[2]", f"body.{body}.torque[3]", "gravity[2]", "wind[1]", "pressure",

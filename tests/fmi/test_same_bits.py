@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import scenes
+from conftest import SCENES
 from master import DISCARD, ERROR, OK
 
 
@@ -160,7 +161,7 @@ def test_parameters_set_before_or_in_initialization_give_the_same(fmu):
 
 
 def test_versions_of_fmi_agree(unpacked):
-    for scene in ("hung", "moving", "woven"):
+    for scene in SCENES:
         two, three = fresh(unpacked[scene, 2]), fresh(unpacked[scene, 3])
         for i in range(6):
             for cloth in (two, three):
@@ -172,9 +173,10 @@ def test_versions_of_fmi_agree(unpacked):
         three.free()
 
 
-def test_yarns_have_their_nodes_and_their_energy(unpacked):
+@pytest.mark.parametrize("scene", ["woven", "mixed"])
+def test_yarns_have_their_nodes_and_their_energy(unpacked, scene):
     toile = pytest.importorskip("toile")
-    fmu = unpacked["woven", 3]
+    fmu = unpacked[scene, 3]
     cloth = fresh(fmu)
     with toile.Sim.from_file(fmu.resources / "scene.json") as sim:
         assert len(sim.yarn_nodes) > 50
@@ -186,6 +188,7 @@ def test_yarns_have_their_nodes_and_their_energy(unpacked):
         assert fmu.variables["yarn.node.position"].shape == [count, 3]
         assert count == len(sim.yarn_nodes) == len(nodes)
         assert np.array_equal(nodes, sim.yarn_nodes)
+        assert np.array_equal(cloth.get("vertex.position"), sim.positions)
     parts = ("kinetic", "gravity", "membrane", "bending", "seam", "contact", "yarn")
     total = sum(cloth.get(f"energy.{part}") for part in parts)
     assert cloth.get("energy.yarn") > 0
