@@ -36,6 +36,7 @@ tools:
 lint:
 	$(CARGO) fmt --check
 	$(CARGO) clippy --release --all-targets -- -D warnings
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --no-deps
 
 test: tools lint
 	$(CARGO) test --release

@@ -235,6 +235,48 @@ fn a_scene_holds_what_the_file_says() {
 }
 
 #[test]
+fn every_problem_of_a_garment_is_listed() {
+    let garment = json!({
+        "toile_garment": 1,
+        "edge_length": "fine",
+        "fabrics": [{"name": "lawn", "density": -1.0}, {"name": "twill", "thick": 2}],
+        "panels": [
+            {"name": "front", "fabric": "twill", "vertices": [[0, 0], [1, 0], [0]], "edges": [[0, 1]]},
+            {"name": "back", "vertices": [[0, 0], [1, 0], [1, 1]], "edges": [[0, 1], [1, 7], [2, 0]]},
+        ],
+        "seams": [
+            {"a": ["front", 0], "b": ["back", 0]},
+            {"a": ["front", 0], "b": ["sleeve", 0]},
+        ],
+        "blend_regions": [{"panel": "collar", "polygon": []}],
+        "colour": "red",
+    });
+    let places = [
+        ("edge_length", "fine"),
+        ("fabrics[0]", "-1"),
+        ("fabrics[1]", "thick"),
+        ("panels[0].vertices[2]", "2"),
+        ("panels[1].edges[1][1]", "corner 7 of 3"),
+        ("seams[1].b[0]", "sleeve"),
+        ("blend_regions[0].panel", "collar"),
+        ("", "colour"),
+    ];
+    let scene = json!({"toile": 1, "garment": garment});
+    for (text, at) in [(garment.to_string(), ""), (scene.to_string(), "garment.")] {
+        let (read, problems) = Scene::read_all(&text, None);
+        assert!(read.is_none());
+        for (place, words) in places {
+            let place = format!("{at}{place}");
+            let named = |e: &&toile::error::Error| {
+                e.message.contains(place.trim_end_matches('.')) && e.message.contains(words)
+            };
+            assert!(problems.iter().any(|e| named(&e)), "{place}: {problems:#?}");
+        }
+        assert_eq!(problems.len(), places.len(), "{problems:#?}");
+    }
+}
+
+#[test]
 fn every_problem_is_listed_with_its_place_and_value() {
     let folder = Folder::new("problems");
     let mut scene = full(&folder);

@@ -10,8 +10,8 @@ use crate::body::Pose;
 use crate::error::{Error, Result};
 use crate::math::Rotation;
 use crate::pattern::Garment;
-use crate::pattern::import::read::{Node, Object, parse};
-use crate::pattern::import::{fabric_from_json, garment_from_node, garment_with_notes};
+use crate::pattern::import::read::{Node, Object, keep, parse};
+use crate::pattern::import::{fabric_from_json, garment_from_node};
 use std::path::Path;
 
 impl Scene {
@@ -39,11 +39,13 @@ impl Scene {
             if object.has("toile") {
                 Ok(reader.scene(&object))
             } else if object.has("toile_garment") || object.has("pattern") {
-                let (garment, notes) = garment_from_node(&root, base_dir)?;
-                reader.checked(&garment, "");
-                Ok(Some(Scene {
-                    notes,
-                    ..Scene::new(garment)
+                let read = garment_from_node(&root, base_dir, &mut reader.problems);
+                Ok(read.map(|(garment, notes)| {
+                    reader.checked(&garment, "");
+                    Scene {
+                        notes,
+                        ..Scene::new(garment)
+                    }
                 }))
             } else {
                 Err(object.error(
@@ -93,13 +95,7 @@ struct Reader<'a> {
 impl Reader<'_> {
     /// The value, or the problem put aside.
     fn keep<T>(&mut self, result: Result<T>) -> Option<T> {
-        match result {
-            Ok(value) => Some(value),
-            Err(e) => {
-                self.problems.push(e);
-                None
-            }
-        }
+        keep(&mut self.problems, result)
     }
 
     fn scene(&mut self, object: &Object<'_>) -> Option<Scene> {
@@ -178,15 +174,21 @@ impl Reader<'_> {
 
     fn garment(&mut self, node: &Node<'_>) -> Option<(Garment, Vec<String>)> {
         let object = self.keep(node.object())?;
-        let read = match object.get("file") {
-            None => garment_from_node(node, self.base_dir),
-            Some(file) => object.only(schema::FILE).and_then(|()| {
-                let (path, text) = file_text(&file, self.base_dir)?;
-                garment_with_notes(&text, path.parent())
-                    .map_err(|e| file.error(format!("{}: {e}", path.display())))
-            }),
+        let (garment, notes) = match object.get("file") {
+            None => garment_from_node(node, self.base_dir, &mut self.problems)?,
+            Some(file) => {
+                let read = object
+                    .only(schema::FILE)
+                    .and_then(|()| file_text(&file, self.base_dir))
+                    .and_then(|(path, text)| Ok((parse(&text)?, path)));
+                let (value, path) = self.keep(read)?;
+                let mut found = Vec::new();
+                let read = garment_from_node(&Node::new(&value, ""), path.parent(), &mut found);
+                let placed = |e: Error| file.error(format!("{}: {e}", path.display()));
+                self.problems.extend(found.into_iter().map(placed));
+                read?
+            }
         };
-        let (garment, notes) = self.keep(read)?;
         self.checked(&garment, &node.path);
         Some((garment, notes))
     }

@@ -2,7 +2,7 @@
 
 use super::DEFAULT_EDGE_LENGTH;
 use super::fabric::{fabric_from_json, fabric_from_node};
-use super::read::{Node, Object};
+use super::read::{Node, Object, keep};
 use super::schema;
 use crate::error::{Error, Result};
 use crate::math::Rotation;
@@ -53,56 +53,79 @@ impl<'a> Names<'a> {
     }
 }
 
-/// Reads a garment object; the notes tell what measured fabrics held that was not used.
+/// Reads a garment object; the notes tell what measured fabrics held that was not used. All problems
+/// are put aside, the first of each fabric, panel, seam and region; with any nothing is read.
 pub fn read_garment(
     garment: &Object<'_>,
     base_dir: Option<&Path>,
-) -> Result<(Garment, Vec<String>)> {
-    let version = garment.need("toile_garment")?;
-    if version.index()? != VERSION {
-        return Err(version.error(format!(
-            "version {} is not known, only {VERSION}",
-            version.index()?
-        )));
+    problems: &mut Vec<Error>,
+) -> Option<(Garment, Vec<String>)> {
+    let before = problems.len();
+    let version = keep(problems, garment.need("toile_garment"))?;
+    let number = keep(problems, version.index())?;
+    if number != VERSION {
+        problems.push(version.error(format!("version {number} is not known, only {VERSION}")));
+        return None;
     }
-    garment.only(schema::GARMENT)?;
+    keep(problems, garment.only(schema::GARMENT));
     let mut notes = Vec::new();
     let mut fabrics = Vec::new();
-    if let Some(list) = garment.get("fabrics") {
-        for node in list.array()? {
-            let (fabric, more) = read_fabric(&node, base_dir)?;
-            notes.extend(more.iter().map(|note| format!("{}: {note}", node.path)));
-            fabrics.push(fabric);
+    let mut complete = true;
+    for node in list(garment, "fabrics", problems) {
+        match read_fabric(&node, base_dir) {
+            Ok((fabric, more)) => {
+                notes.extend(more.iter().map(|note| format!("{}: {note}", node.path)));
+                fabrics.push(fabric);
+            }
+            Err(e) => {
+                problems.push(e);
+                complete = false;
+            }
         }
     }
-    if fabrics.is_empty() {
+    if fabrics.is_empty() && complete {
         fabrics.push(Fabric::default());
     }
-    let fabric_names = Names::new("fabric", fabrics.iter().map(|f| f.name.as_str()));
-    let mut panels = Vec::new();
-    for node in garment.need("panels")?.array()? {
-        panels.push(read_panel(&node.object()?, &fabric_names)?);
-    }
-    let panel_names = Names::new("panel", panels.iter().map(|p| p.name.as_str()));
+    // a fabric that could not be read has no name: what names one is not held against the others
+    let fabric_names =
+        complete.then(|| Names::new("fabric", fabrics.iter().map(|f| f.name.as_str())));
+    keep(problems, garment.need("panels"));
+    let nodes = list(garment, "panels", problems);
+    let read = nodes.iter().map(|node| {
+        let panel = node
+            .object()
+            .and_then(|o| read_panel(&o, fabric_names.as_ref()));
+        keep(problems, panel)
+    });
+    let read: Vec<Option<Panel>> = read.collect();
+    let panel_names = Names::new("panel", nodes.iter().map(name_of));
     let mut seams = Vec::new();
-    if let Some(list) = garment.get("seams") {
-        for node in list.array()? {
-            seams.push(read_seam(&node.object()?, &panel_names)?);
-        }
+    for node in list(garment, "seams", problems) {
+        let seam = node.object().and_then(|o| read_seam(&o, &panel_names));
+        seams.extend(keep(problems, seam));
     }
     let mut blend_regions = Vec::new();
-    if let Some(list) = garment.get("blend_regions") {
-        for node in list.array()? {
-            blend_regions.push(read_blend_region(&node.object()?, &panel_names)?);
-        }
+    for node in list(garment, "blend_regions", problems) {
+        let region = node
+            .object()
+            .and_then(|o| read_blend_region(&o, &panel_names));
+        blend_regions.extend(keep(problems, region));
+    }
+    let name = garment
+        .get("name")
+        .map_or(Ok("garment"), |name| name.text());
+    let name = keep(problems, name);
+    let edge_length = keep(
+        problems,
+        garment.number_or("edge_length", DEFAULT_EDGE_LENGTH),
+    );
+    if problems.len() > before {
+        return None;
     }
     let garment = Garment {
-        name: match garment.get("name") {
-            Some(name) => name.text()?.to_owned(),
-            None => "garment".into(),
-        },
-        edge_length: garment.number_or("edge_length", DEFAULT_EDGE_LENGTH)?,
-        panels,
+        name: name?.to_owned(),
+        edge_length: edge_length?,
+        panels: read.into_iter().collect::<Option<_>>()?,
         seams,
         fabrics,
         blend_regions,
@@ -117,7 +140,23 @@ pub fn read_garment(
             ));
         }
     }
-    Ok((garment, notes))
+    Some((garment, notes))
+}
+
+/// Entries of a list, none where there is no list.
+fn list<'a>(object: &Object<'a>, key: &str, problems: &mut Vec<Error>) -> Vec<Node<'a>> {
+    let entries = object.get(key).map(|node| node.array());
+    entries
+        .and_then(|entries| keep(problems, entries))
+        .unwrap_or_default()
+}
+
+/// Name of a panel, empty where it has none that could be read.
+fn name_of<'a>(node: &Node<'a>) -> &'a str {
+    node.value
+        .get("name")
+        .and_then(|name| name.as_str())
+        .unwrap_or_default()
 }
 
 fn read_fabric(node: &Node<'_>, base_dir: Option<&Path>) -> Result<(Fabric, Vec<String>)> {
@@ -143,7 +182,7 @@ fn read_fabric(node: &Node<'_>, base_dir: Option<&Path>) -> Result<(Fabric, Vec<
     Ok((fabric, notes))
 }
 
-fn read_panel(panel: &Object<'_>, fabrics: &Names<'_>) -> Result<Panel> {
+fn read_panel(panel: &Object<'_>, fabrics: Option<&Names<'_>>) -> Result<Panel> {
     panel.only(schema::PANEL)?;
     let mut vertices = Vec::new();
     for node in panel.need("vertices")?.array()? {
@@ -172,9 +211,9 @@ fn read_panel(panel: &Object<'_>, fabrics: &Names<'_>) -> Result<Panel> {
             Some(node) => read_placement(&node.object()?)?,
             None => Placement::default(),
         },
-        fabric: match panel.get("fabric") {
-            Some(node) => fabrics.find(&node)? as usize,
-            None => 0,
+        fabric: match (panel.get("fabric"), fabrics) {
+            (Some(node), Some(fabrics)) => fabrics.find(&node)? as usize,
+            _ => 0,
         },
         grain: read_angle(panel, "grain_deg", "grain_rad")?,
         edge_length: panel

@@ -15,7 +15,7 @@ pub use fabric::fabric_from_json;
 
 use super::Garment;
 use crate::error::{Error, Result};
-use read::{Node, parse};
+use read::{Node, keep, parse};
 use std::path::Path;
 
 /// Target edge length of garments whose file names none [m].
@@ -29,23 +29,33 @@ pub fn garment_from_json(text: &str, base_dir: Option<&Path>) -> Result<Garment>
 
 /// [`garment_from_json`] with notes on what the fabrics' files said that was dropped.
 pub fn garment_with_notes(text: &str, base_dir: Option<&Path>) -> Result<(Garment, Vec<String>)> {
-    garment_from_node(&Node::new(&parse(text)?, ""), base_dir)
+    let mut problems = Vec::new();
+    let read = garment_from_node(&Node::new(&parse(text)?, ""), base_dir, &mut problems);
+    match (problems.into_iter().next(), read) {
+        (None, Some(read)) => Ok(read),
+        (Some(problem), _) => Err(problem),
+        (None, None) => Err(Error::parse("no garment could be read")),
+    }
 }
 
-/// Reads a garment that stands inside another JSON text.
+/// Reads a garment that stands inside another JSON text. What is wrong is put aside, all of a garment of
+/// toile's own and the first of a specification; nothing is read then.
 pub fn garment_from_node(
     node: &Node<'_>,
     base_dir: Option<&Path>,
-) -> Result<(Garment, Vec<String>)> {
-    let object = node.object()?;
+    problems: &mut Vec<Error>,
+) -> Option<(Garment, Vec<String>)> {
+    let object = keep(problems, node.object())?;
     if object.has("toile_garment") {
-        json::read_garment(&object, base_dir)
+        json::read_garment(&object, base_dir, problems)
     } else if object.has("pattern") {
-        Ok((garmentcode::read_specification(&object)?, Vec::new()))
+        let garment = keep(problems, garmentcode::read_specification(&object))?;
+        Some((garment, Vec::new()))
     } else {
-        Err(object.error(
+        problems.push(object.error(
             "neither a toile garment (key 'toile_garment') nor a GarmentCode specification (key 'pattern')",
-        ))
+        ));
+        None
     }
 }
 

@@ -9,6 +9,11 @@ use serde_json::{Map, Value};
 /// Longest JSON text accepted [bytes].
 pub const MAX_TEXT: usize = 256 << 20;
 
+/// The value, or nothing where the problem was put aside.
+pub fn keep<T>(problems: &mut Vec<Error>, result: Result<T>) -> Option<T> {
+    result.map_err(|e| problems.push(e)).ok()
+}
+
 /// Parses JSON text; nesting above 128 levels, numbers beyond f64 and bad syntax are refused.
 pub fn parse(text: &str) -> Result<Value> {
     if text.len() > MAX_TEXT {

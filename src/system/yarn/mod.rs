@@ -3,7 +3,7 @@
 //! Discretisation and forces after Cirio, Lopez-Moreno and Otaduy 2017 ("Yarn-level cloth simulation with
 //! sliding persistent contacts") and 2014 (woven cloth). Each energy is a pure
 //! [`Kernel`](kernel::Kernel) of one stencil; [`adapter`] makes terms of them, over the blocks that
-//! [`Unknowns`](unknowns::Unknowns) numbers. What is lagged within a step, the normal forces of
+//! [`Unknowns`] numbers. What is lagged within a step, the normal forces of
 //! [`compression`] and the anchors of [`friction`], is in the State.
 
 pub mod adapter;
