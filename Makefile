@@ -50,6 +50,7 @@ bench: all
 bench-yarn: all
 	$(CARGO) bench --bench yarn
 	$(CARGO) bench --bench yarn_terms
+	$(CARGO) bench --bench yarn_fabrics
 
 fuzz:
 	@bash scripts/fuzz.sh $(FUZZ_SECONDS)

@@ -15,6 +15,7 @@ mod terms_cases;
 mod tri_common;
 mod yarn_cases;
 mod yarn_common;
+mod yarn_pull;
 
 #[path = "abi.rs"]
 mod abi;
@@ -132,6 +133,8 @@ mod yarn_laws;
 mod yarn_robust;
 #[path = "yarn_sims.rs"]
 mod yarn_sims;
+#[path = "yarn_stretch.rs"]
+mod yarn_stretch;
 #[path = "yarn_terms_fd.rs"]
 mod yarn_terms_fd;
 #[path = "yarn_terms_symmetry.rs"]

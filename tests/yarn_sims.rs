@@ -1,8 +1,14 @@
 //! Patches simulated as yarns alone: what fabrics are known to do, and what hosts rely on.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may panic")]
 
+use toile::body::Body;
+use toile::cloth::Cloth;
+use toile::math::{Rotation, Vec3};
 use toile::pattern::import::garment_from_json;
-use toile::sim::{DrapeOptions, Outcome, Settings, Sim, SimOptions};
+use toile::sim::{ContactSettings, DrapeOptions, Outcome, Settings, Sim, SimOptions};
+use toile::system::contact::spheres::Spheres;
+use toile::system::points::Points;
+use toile::yarn::{Layout, YarnMaterial, Yarns, lay};
 
 /// A rectangle of a fabric of yarns, every yarn simulated.
 pub(crate) fn patch(yarns: &str, width: f64, height: f64, region: &str) -> String {
@@ -181,4 +187,65 @@ fn what_cannot_be_simulated_is_refused() {
     );
     let places = vec![[f64::NAN; 3]];
     assert!(sim.pin_yarn_nodes(&[0], Some(&places)).is_err());
+}
+
+const BURLAP: &str = r#"{"weave": "plain", "warp_pitch": 0.005, "radius": 0.001}"#;
+
+/// Nodes that sliding has brought near each other along a yarn, or around a crossing, are neighbours, whatever was
+/// between them when they were laid: self-contact does not keep them apart.
+#[test]
+fn nodes_that_yarns_have_slid_together_are_neighbours() {
+    let garment = garment_from_json(&patch(BURLAP, 0.04, 0.04, WHOLE), None).unwrap();
+    let mesh = lay(&garment, &Layout::default()).unwrap();
+    let fabric = garment.fabrics[0].yarns.as_ref().unwrap();
+    let yarns = Yarns::laid(mesh, vec![YarnMaterial::from(fabric)]);
+    let triangles = toile::tri::triangulate(&garment, 1.0, 1000).unwrap();
+    let cloth = Cloth::new(&garment, triangles).unwrap();
+    let points = Points::new(&cloth, Some(&yarns));
+    let mut spheres = Spheres::new(&cloth, &points, Some(&yarns), 0.15).unwrap();
+    let point = |passage: usize| points.vertex_count as u32 + yarns.mesh.incidences[passage].node;
+    let [end, second, third] = [0, 2, 3].map(point);
+    assert!(!spheres.excluded(end, second));
+    let laid: Vec<f64> = yarns.mesh.incidences.iter().map(|i| i.u).collect();
+    let mut u = laid.clone();
+    (u[1], u[2]) = (5e-4, 2e-3);
+    spheres.follow(&u);
+    assert!(spheres.excluded(end, second) && spheres.excluded(second, end));
+    assert!(!spheres.excluded(end, third));
+    // from the next yarn's crossing along the weft, which has slid likewise, and on along the first yarn
+    let weft = |p: usize| {
+        let node = yarns.mesh.incidences[p].node;
+        let other = |s: &&toile::yarn::Strand| s.incidence as usize != p;
+        let strand = yarns.mesh.stack(node as usize).iter().find(other);
+        strand.unwrap().incidence as usize
+    };
+    let beside = weft(2) + 1;
+    assert!(!spheres.excluded(end, point(beside)));
+    u[beside] = u[weft(2)] + 1e-3;
+    spheres.follow(&u);
+    assert!(spheres.excluded(end, point(beside)));
+    spheres.follow(&laid);
+    assert!(!spheres.excluded(end, second));
+}
+
+/// A loose weave that falls onto a drum comes to rest over it, with self-contact, and no yarn leaves the cloth.
+#[test]
+fn a_loose_weave_falls_onto_a_drum() {
+    let rough = [("solver.newton.relative_tolerance", 1e-2)];
+    let mut sim = sim(&patch(BURLAP, 0.04, 0.04, WHOLE), 0.0, &rough);
+    sim.set_number("gravity.z", -9.81).unwrap();
+    let body = Body::capsule(0.1, 0.02).unwrap();
+    let body = sim.add_body(&body, &ContactSettings::default()).unwrap();
+    let lying = Rotation::from_axis_angle(&Vec3::z_axis(), std::f64::consts::FRAC_PI_2);
+    let q = lying.quaternion();
+    sim.set_body_pose(body, [0.02, 0.02, -0.024], [q.i, q.j, q.k, q.w])
+        .unwrap();
+    let mut last = f64::INFINITY;
+    for _ in 0..30 {
+        last = sim.step(0.01).expect("step").kinetic_energy;
+    }
+    println!("kinetic energy {last:.1e} J at the end");
+    assert!(last < 1e-8, "{last}");
+    assert_eq!(sim.yarn_changes().passages_gone, 0);
+    assert!(sim.yarn_slips().iter().all(|s| s.abs() < 1e-3));
 }

@@ -6,6 +6,8 @@ use crate::math::parallel::Workers;
 use crate::system::bodies::SLOPE;
 use crate::system::build::System;
 use crate::system::term::{Bodies, Configuration};
+use crate::system::yarn::kernel::Kernel;
+use crate::system::yarn::stretch::Stretch;
 
 /// Vertices of one parallel task.
 const CHUNK: usize = 256;
@@ -31,8 +33,11 @@ pub(super) fn inadmissible(
             return Some(reason);
         }
     }
-    if system.terms.iter().any(|term| term.max_step(at) < 1.0) {
-        return Some("cloth would pass through itself");
+    if let Some(term) = system.terms.iter().find(|term| term.max_step(at) < 1.0) {
+        return Some(match term.name() {
+            Stretch::NAME => "a yarn would slide out between two contacts",
+            _ => "cloth would pass through itself",
+        });
     }
     if dynamic && system.largest_stretch_change(start, x) > 0.2 {
         return Some("an edge changed its length too much");

@@ -1,7 +1,7 @@
 //! Static drape: coarse levels, the unfolding of a tangle, and rest; sewing is in `sew`.
 
 use super::engine::Engine;
-use super::relax::{End, RelaxOptions, Relaxed, relax};
+use super::relax::{End, RelaxOptions, Relaxed, holds, relax};
 use super::rest::{self, Rest};
 use super::sew::{NEARLY_CLOSED, sew};
 use super::step::{Totals, step};
@@ -203,8 +203,7 @@ fn may_go_on(coarse: &Engine, state: &State) -> Result<bool> {
 
 /// Whether pins and bodies are where they are to be.
 fn is_settled(state: &State) -> bool {
-    let pinned = |p: &Pin| state.positions[p.vertex as usize] == p.target;
-    state.pins.iter().all(pinned)
+    holds(state)
         && (state.bodies.iter()).all(|b| b.pose == b.target && b.target_vertices.is_empty())
 }
 

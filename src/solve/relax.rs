@@ -10,7 +10,7 @@ use super::pace::Pace;
 use super::step::Totals;
 use crate::error::{Error, Result, Status};
 use crate::math::Vec3;
-use crate::system::state::State;
+use crate::system::state::{Pin, State};
 
 /// When a relaxation stops.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,6 +63,15 @@ const FREEZE: f64 = 300.0;
 /// Steps after which friction follows only every tenth step.
 const SETTLED: u64 = 30;
 
+/// Least part of their way by which pins are moved at once.
+const LEAST_PART: f64 = 1e-3;
+
+/// Whether pins are where they are to be.
+pub(super) fn holds(state: &State) -> bool {
+    let there = |p: &Pin| state.positions[p.vertex as usize] == p.target;
+    state.pins.iter().all(there)
+}
+
 /// Relaxes the state towards rest. `watch(step, residual)` returns false to stop.
 pub fn relax(
     engine: &mut Engine,
@@ -82,14 +91,16 @@ pub fn relax(
     if options.disturbed {
         disturb(state, IMPERFECTION * engine.system.mean_edge());
     }
+    // what is held may have to be moved in parts, so that nothing passes through what is near it
+    let mut part = 1.0;
     while out.totals.substeps < options.max_steps {
         let exact = pace.exactness(engine);
         // near rest friction is frozen while Newton's method converges: anchors that move after
         // every correction would creep
         let follow = out.totals.residual > FREEZE * options.force_tolerance
             && (out.totals.substeps < SETTLED || out.totals.substeps.is_multiple_of(10));
-        let (summary, reason) = match engine.attempt(state, h, 1.0, Motion::Relax { exact, follow })
-        {
+        let motion = Motion::Relax { exact, follow };
+        let (summary, reason) = match engine.attempt(state, h, part, motion) {
             Ok(Attempt::Accepted(summary)) => (summary, None),
             Ok(Attempt::Rejected(reason, summary)) => (summary, Some(reason.to_owned())),
             Err(e) if matches!(e.status, Status::NoAdmissibleState | Status::LinearSolve) => {
@@ -103,6 +114,10 @@ pub fn relax(
         if let Some(reason) = reason {
             out.totals.cut = true;
             pace.refused(state);
+            if !holds(state) && part > LEAST_PART {
+                part *= 0.5;
+                continue;
+            }
             h *= 0.25;
             if h < SMALLEST_STEP {
                 // nothing lower can be found: rest up to rounding, or a dead end that is reported
@@ -121,6 +136,7 @@ pub fn relax(
         }
         out.totals.substeps += 1;
         out.totals.residual = summary.static_residual;
+        part = (2.0 * part).min(1.0);
         // short steps that are taken do lead on: only refused ones may end the relaxation
         h = pace.taken(engine, state, &summary, h);
         h = h.clamp(SMALLEST_STEP, options.largest_step);
@@ -130,7 +146,7 @@ pub fn relax(
             out.end = End::Rest;
             return Ok(out);
         }
-        if summary.static_residual <= options.force_tolerance {
+        if summary.static_residual <= options.force_tolerance && holds(state) {
             engine.follow(state)?;
             out.totals.residual = engine.residual(state)?;
             if out.totals.residual <= options.force_tolerance {

@@ -5,6 +5,7 @@ mod clearance;
 pub mod crossing;
 pub mod edge;
 mod friction;
+mod rods;
 pub mod self_contact;
 pub mod spheres;
 pub mod travel;

@@ -301,6 +301,7 @@ impl Term for SelfContact {
         } else {
             0.0
         };
+        self.spheres.follow(&state.u);
         self.update_normals(&state.positions);
         self.find_pairs(state, dt);
         let changed = self.stencils.as_slice() != self.found.as_flattened();

@@ -33,8 +33,10 @@
 //!
 //! A node's sphere has the radius of the yarn. Segments are ways like edges, and so is the way from a node that rides
 //! on a triangle to the triangle's vertices; a node and another point of its panel are
-//! neighbours if the straight line between them is short, since yarns of one layer touch.
+//! neighbours if the straight line between them is short, since yarns of one layer touch. Nodes that have become neighbours
+//! because yarns have slid are so too ([`rods`](super::rods)).
 
+use super::rods::Rods;
 use crate::cloth::Cloth;
 use crate::error::{Error, Result};
 use crate::math::topology::edges;
@@ -46,6 +48,8 @@ use std::collections::BinaryHeap;
 
 /// Ratio of the way over edges to the straight line up to which they count as one way.
 const DETOUR: f64 = 1.5;
+/// Arc of the tightest fold over the distance of its layers.
+const FOLD: f64 = std::f64::consts::FRAC_PI_2;
 
 /// Radii and excluded pairs.
 #[derive(Clone, Debug, Default)]
@@ -59,6 +63,7 @@ pub struct Spheres {
     /// Excluded partners `b > a` of vertex `a`: `partners[starts[a]..starts[a + 1]]`, sorted.
     starts: Vec<u32>,
     partners: Vec<u32>,
+    rods: Rods,
 }
 
 impl Spheres {
@@ -109,6 +114,7 @@ impl Spheres {
             reserve,
             starts: vec![0],
             partners: Vec::new(),
+            rods: yarns.map_or_else(Rods::default, |y| Rods::new(y, points.vertex_count as u32)),
         };
         let mut ways = ways(cloth, &edges, yarns);
         for rider in points.riders.list() {
@@ -133,6 +139,11 @@ impl Spheres {
         self.rest_distance(a, b) / (1.0 + self.reserve)
     }
 
+    /// Takes the material coordinates of the yarns at the start of a step.
+    pub fn follow(&mut self, u: &[f64]) {
+        self.rods.follow(u);
+    }
+
     /// Whether two vertices are neighbours along the cloth and so never meet.
     pub fn excluded(&self, a: u32, b: u32) -> bool {
         let (a, b) = (a.min(b), a.max(b));
@@ -140,7 +151,9 @@ impl Spheres {
             self.starts[a as usize] as usize,
             self.starts[a as usize + 1] as usize,
         );
-        a == b || self.partners[from..to].binary_search(&b).is_ok()
+        a == b
+            || self.partners[from..to].binary_search(&b).is_ok()
+            || self.rods.near(a, b, FOLD * self.rest_distance(a, b))
     }
 
     /// Number of excluded pairs.
@@ -150,7 +163,7 @@ impl Spheres {
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        8 * self.radii.len() + 4 * (self.starts.len() + self.partners.len())
+        8 * self.radii.len() + 4 * (self.starts.len() + self.partners.len()) + self.rods.bytes()
     }
 
     /// Shortest ways from every point, as far as a pair can count as neighbours.
@@ -173,12 +186,11 @@ impl Spheres {
             }
         }
 
-        let fold = std::f64::consts::FRAC_PI_2;
         let mut distance = vec![f64::INFINITY; n];
         let mut touched = Vec::new();
         let mut heap = BinaryHeap::new();
         for a in 0..n as u32 {
-            let reach = DETOUR * fold * (self.radii[a as usize] + self.largest);
+            let reach = DETOUR * FOLD * (self.radii[a as usize] + self.largest);
             distance[a as usize] = 0.0;
             touched.push(a);
             heap.push(Reverse((Metres(0.0), a)));
@@ -200,7 +212,7 @@ impl Spheres {
             touched.sort_unstable();
             for b in touched.drain(..) {
                 let way = std::mem::replace(&mut distance[b as usize], f64::INFINITY);
-                let limit = fold * self.rest_distance(a, b);
+                let limit = FOLD * self.rest_distance(a, b);
                 let straight = flat
                     .line(a, b)
                     .is_some_and(|(l, yarns)| l <= limit && (yarns || way <= DETOUR * l));

@@ -95,6 +95,13 @@ impl Contacts {
                 &self.rule,
             ),
         };
+        if !releases && sliding == Sliding::WhereSlipping {
+            // at rest friction would fix and free a coordinate in turn as the normal forces follow: its anchor
+            // holds it as well
+            for (slides, before) in next.iter_mut().zip(&state.sliding) {
+                *slides |= before;
+            }
+        }
         for (slides, incidence) in next.iter_mut().zip(&mesh.incidences) {
             *slides &= !self.held[incidence.node as usize];
         }
