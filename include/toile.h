@@ -1010,8 +1010,8 @@ void toile_body_free(struct toile_body *body);
  * Triangulates a garment and makes it ready to move; its vertices stand where the panels are
  * placed. `desc` NULL takes the defaults. The garment may be changed or freed afterwards. Free the
  * simulation with toile_sim_free. TOILE_E_GEOMETRY and TOILE_E_LIMIT name the panel;
- * TOILE_E_ARGUMENT: a blend region holds no triangle, or its fabric has no yarns;
- * TOILE_E_UNSUPPORTED: a region that covers a panel in part has hybrid rings.
+ * TOILE_E_ARGUMENT: a blend region holds no triangle, its fabric has no yarns, or it has more than 3 hybrid
+ * rings; TOILE_E_UNSUPPORTED: regions have different numbers of rings.
  */
 toile_status toile_sim_create(const struct toile_garment *garment,
                               const struct toile_sim_desc *desc,

@@ -9,7 +9,7 @@ mod run;
 mod world;
 mod yarns;
 
-use crate::blend::Riders;
+use crate::blend::Coupling;
 use crate::body::Body;
 use crate::cloth::Cloth;
 use crate::error::{Error, Result};
@@ -103,10 +103,10 @@ impl Sim {
             numbers: options.settings.that_matter(),
         };
         let laid = yarns.as_ref().map(|part| part.now.clone());
-        let alone = Riders::default();
-        let riders = yarns.as_ref().map_or(&alone, |part| &part.riders);
+        let coupling =
+            (yarns.as_ref()).map_or_else(Coupling::default, |part| part.coupling.clone());
         let build = BuildOptions::from(&options.settings);
-        let system = System::with_yarns(cloth, laid, riders, &build)?;
+        let system = System::with_yarns(cloth, laid, coupling, &build)?;
         let mut state = State {
             time: 0.0,
             positions: mesh.placed.clone(),

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may panic")]
 
 use std::f64::consts::PI;
-use toile::blend::Direct;
+use toile::blend::direct;
 use toile::cloth::Cloth;
 use toile::math::Vec2;
 use toile::pattern::import::garment_from_json;
@@ -18,7 +18,7 @@ const YOUNG: f64 = 1e7;
 /// Shear modulus of its crossings [Pa].
 const SHEAR: f64 = 1.6e5;
 /// Mass of a yarn [kg/m].
-const LINE: f64 = 1.5e-4;
+pub(crate) const LINE: f64 = 1.5e-4;
 
 /// A plain weave and the membrane that it is: `C11 = C22 = Y pi R^2 / d`, four corners of `S R^2 d` to
 /// a crossing.
@@ -35,7 +35,7 @@ fn fabric() -> String {
 }
 
 /// A square of the weave with these regions of yarns.
-fn square(side: f64, edge: f64, regions: &[&str]) -> String {
+pub(crate) fn square(side: f64, edge: f64, regions: &[&str]) -> String {
     let regions: Vec<String> = regions
         .iter()
         .map(|r| format!(r#"{{"panel": "p", "polygon": {r}}}"#))
@@ -51,7 +51,7 @@ fn square(side: f64, edge: f64, regions: &[&str]) -> String {
     )
 }
 
-fn sim(text: &str, gravity: f64, numbers: &[(&str, f64)]) -> Sim {
+pub(crate) fn sim(text: &str, gravity: f64, numbers: &[(&str, f64)]) -> Sim {
     let garment = garment_from_json(text, None).expect("garment");
     let mut settings = Settings::default();
     for (name, value) in numbers {
@@ -66,7 +66,7 @@ fn sim(text: &str, gravity: f64, numbers: &[(&str, f64)]) -> Sim {
 }
 
 /// Vertices on the outline of the square.
-fn rim(sim: &Sim, side: f64) -> Vec<u32> {
+pub(crate) fn rim(sim: &Sim, side: f64) -> Vec<u32> {
     let on = |x: f64| x < 1e-9 || x > side - 1e-9;
     let list = (0..).zip(sim.vertex_uv());
     list.filter(|(_, p)| on(p.x) || on(p.y))
@@ -83,7 +83,7 @@ fn size(errors: &[f64]) -> [f64; 2] {
 
 /// Errors of strain over the applied one: of segments inside the region, of segments that reach over
 /// the border and triangles beside it.
-fn strain_errors(sim: &Sim, applied: f64) -> [[f64; 2]; 2] {
+pub(crate) fn strain_errors(sim: &Sim, applied: f64) -> [[f64; 2]; 2] {
     let yarns = sim.yarns().expect("yarns");
     let (mut full, mut transition) = (Vec::new(), Vec::new());
     for y in 0..yarns.yarn_count() {
@@ -97,7 +97,7 @@ fn strain_errors(sim: &Sim, applied: f64) -> [[f64; 2]; 2] {
             let d = sim.yarn_nodes()[b] - sim.yarn_nodes()[a];
             let expected = Vec2::new(flat.x * (1.0 + applied), flat.y).norm() / flat.norm() - 1.0;
             let error = (d.norm() / flat.norm() - 1.0 - expected).abs() / applied;
-            if nodes.iter().all(|n| yarns.is_inside(*n)) {
+            if nodes.iter().all(|n| yarns.is_whole(*n)) {
                 full.push(error);
             } else {
                 transition.push(error);
@@ -178,13 +178,14 @@ fn every_piece_of_yarn_weighs_once() {
         .map(|y| laid.yarn(y).last().unwrap().u - laid.yarn(y)[0].u)
         .sum();
     let mass = |full: &[bool]| {
-        let direct = Direct::new(&garment, &mesh, full, laid.clone(), &materials).expect("direct");
-        let yarns = Yarns::laid(direct.yarns, materials.to_vec());
+        let joined = direct::join(&garment, &mesh, full, laid.clone(), &materials).expect("direct");
+        let yarns = Yarns::laid(joined.yarns, materials.to_vec());
         let kept: Vec<usize> = (0..full.len()).filter(|t| !full[*t]).collect();
-        let share: Vec<_> = kept.iter().map(|t| direct.share[*t]).collect();
-        let masses: Vec<_> = kept.iter().map(|t| direct.masses[*t]).collect();
+        let share: Vec<_> = kept.iter().map(|t| joined.share[*t]).collect();
+        let masses: Vec<_> = kept.iter().map(|t| joined.masses[*t]).collect();
+        let own = vec![1.0; kept.len()];
         let left = mesh.without_triangles(full);
-        let cloth = Cloth::covered(&garment, left, &share, &masses).expect("cloth");
+        let cloth = Cloth::covered(&garment, left, share, own, &masses).expect("cloth");
         let total: f64 = Points::new(&cloth, Some(&yarns)).masses.iter().sum();
         (total / (LINE * length), masses.iter().all(Option::is_some))
     };
@@ -246,9 +247,9 @@ fn sim_like(side: f64, edge: f64, region: &str) -> Sim {
     sim(&square(side, edge, &[region]), -9.81, &[])
 }
 
-const WHOLE: &str = "[[-1, -1], [1, -1], [1, 1], [-1, 1]]";
+pub(crate) const WHOLE: &str = "[[-1, -1], [1, -1], [1, 1], [-1, 1]]";
 
-fn held_by_its_corners(text: &str, numbers: &[(&str, f64)]) -> Sim {
+pub(crate) fn held_by_its_corners(text: &str, numbers: &[(&str, f64)]) -> Sim {
     let mut sim = sim(text, -9.81, numbers);
     let corners: Vec<u32> = [[0.0, 0.03], [0.03, 0.03]]
         .iter()

@@ -19,6 +19,12 @@ mod yarn_pull;
 
 #[path = "abi.rs"]
 mod abi;
+#[path = "blend_algebra.rs"]
+mod blend_algebra;
+#[path = "blend_hard.rs"]
+mod blend_hard;
+#[path = "blend_patches.rs"]
+mod blend_patches;
 #[path = "body_contact_term.rs"]
 mod body_contact_term;
 #[path = "body_mannequin.rs"]

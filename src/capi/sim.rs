@@ -110,8 +110,8 @@ unsafe fn give(sim: Sim, host: Host, out: *mut *mut toile_sim) -> Result<()> {
 /// Triangulates a garment and makes it ready to move; its vertices stand where the panels are
 /// placed. `desc` NULL takes the defaults. The garment may be changed or freed afterwards. Free the
 /// simulation with toile_sim_free. TOILE_E_GEOMETRY and TOILE_E_LIMIT name the panel;
-/// TOILE_E_ARGUMENT: a blend region holds no triangle, or its fabric has no yarns;
-/// TOILE_E_UNSUPPORTED: a region that covers a panel in part has hybrid rings.
+/// TOILE_E_ARGUMENT: a blend region holds no triangle, its fabric has no yarns, or it has more than 3 hybrid
+/// rings; TOILE_E_UNSUPPORTED: regions have different numbers of rings.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn toile_sim_create(
     garment: *const toile_garment,

@@ -23,7 +23,9 @@ pub struct Cloth {
     /// Part of each triangle's membrane along weft and warp that is its own: 1, or less where yarns
     /// lie over it.
     pub share: Vec<[f64; 2]>,
-    /// A third of the area of the triangles around each vertex [m^2].
+    /// Part of its bending and of what acts on its surface that is its own.
+    pub own: Vec<f64>,
+    /// A third of the area of the triangles around each vertex, as far as it is their own [m^2].
     pub vertex_areas: Vec<f64>,
     /// Lumped mass of each vertex [kg].
     pub masses: Vec<f64>,
@@ -33,15 +35,17 @@ impl Cloth {
     /// Rest data of a garment on one of its meshes. A triangle without area is refused.
     pub fn new(garment: &Garment, mesh: GarmentMesh) -> Result<Self> {
         let count = mesh.triangles.len();
-        Self::covered(garment, mesh, &vec![[1.0; 2]; count], &vec![None; count])
+        let (share, own) = (vec![[1.0; 2]; count], vec![1.0; count]);
+        Self::covered(garment, mesh, share, own, &vec![None; count])
     }
 
-    /// Same where yarns cover some of the triangles: with the part of each membrane that is left, and
-    /// the mass of the triangles that do not have their fabric's [kg].
+    /// Same where yarns cover some of the triangles: with the part of each membrane and of other energies that
+    /// is left, and the mass of the triangles that do not have their fabric's [kg].
     pub fn covered(
         garment: &Garment,
         mesh: GarmentMesh,
-        share: &[[f64; 2]],
+        share: Vec<[f64; 2]>,
+        own: Vec<f64>,
         covered_masses: &[Option<f64>],
     ) -> Result<Self> {
         for fabric in &garment.fabrics {
@@ -53,7 +57,8 @@ impl Cloth {
             panel_grain: garment.panels.iter().map(|p| p.grain).collect(),
             areas: Vec::with_capacity(mesh.triangles.len()),
             densities: Vec::with_capacity(mesh.triangles.len()),
-            share: share.to_vec(),
+            share,
+            own,
             vertex_areas: vec![0.0; mesh.uv.len()],
             masses: vec![0.0; mesh.uv.len()],
             mesh,
@@ -65,10 +70,10 @@ impl Cloth {
                 return Err(Error::geometry(format!("triangle {t} has area {area}")));
             }
             let panel = cloth.mesh.triangle_panel[t] as usize;
-            let own = cloth.fabrics[cloth.panel_fabric[panel]].density;
-            let density = covered_masses[t].map_or(own, |mass| mass / area);
+            let plain = cloth.fabrics[cloth.panel_fabric[panel]].density;
+            let density = covered_masses[t].map_or(plain, |mass| mass / area);
             for &v in tri {
-                cloth.vertex_areas[v as usize] += area / 3.0;
+                cloth.vertex_areas[v as usize] += area * cloth.own[t] / 3.0;
                 cloth.masses[v as usize] += area * density / 3.0;
             }
             cloth.areas.push(area);

@@ -325,7 +325,7 @@ impl Points {
     fn new(sim: &Sim) -> Result<Self> {
         let mut nodes = YarnMesh::default();
         if let Some(mesh) = sim.yarns() {
-            for n in (0..mesh.uv.len()).filter(|n| mesh.is_inside(*n as u32)) {
+            for n in (0..mesh.uv.len()).filter(|n| mesh.is_whole(*n as u32)) {
                 nodes.uv.push(mesh.uv[n]);
                 nodes.lift.push(mesh.lift[n]);
                 nodes.node_panel.push(mesh.node_panel[n]);

@@ -144,7 +144,12 @@ impl Sim {
             n < mesh.uv.len() && !mesh.stack(n).is_empty()
         };
         if self.yarns().is_some_and(passed) {
-            return if self.moves_by_itself(point) {
+            let filter = self.yarns.as_ref().and_then(|y| y.coupling.filter.as_ref());
+            return if filter.is_some_and(|f| f.places(point)) {
+                Err(Error::argument(format!(
+                    "yarn node {node} lies in a hybrid ring: hold vertices there"
+                )))
+            } else if self.moves_by_itself(point) {
                 Ok(())
             } else {
                 Err(Error::argument(format!(
@@ -216,7 +221,7 @@ impl Sim {
     pub fn moves_by_itself(&self, point: u32) -> bool {
         self.yarns.as_ref().is_none_or(|part| {
             let follows = (point as usize) < self.mesh.uv.len() && part.follows(point);
-            !follows && !part.riders.rides(point)
+            !follows && !part.coupling.riders.rides(point)
         })
     }
 

@@ -21,6 +21,12 @@ pub struct SystemInfo {
     pub yarn_nodes: usize,
     /// Nodes among them that triangles carry.
     pub carried_nodes: usize,
+    /// Nodes in hybrid rings, blended with triangles.
+    pub hybrid_nodes: usize,
+    /// Vertices there that nodes determine, and those that they support too poorly.
+    pub hybrid_vertices: [usize; 2],
+    /// How far a vertex there may go when each node goes by one.
+    pub amplification: f64,
     /// Yarns.
     pub yarns: usize,
     /// Scalar unknowns.
@@ -96,6 +102,21 @@ impl Sim {
         &self.masses
     }
 
+    /// Mass of each point, vertices first, as it is simulated [kg].
+    pub fn point_masses(&self) -> Vec<f64> {
+        self.engine().system.points.masses.clone()
+    }
+
+    /// How far the nodes of hybrid rings are from what their vertices say of them, weighted means [m]; 0 without
+    /// rings.
+    pub fn constraint_violation(&self) -> f64 {
+        let filter = self
+            .yarns
+            .as_ref()
+            .and_then(|part| part.coupling.filter.as_ref());
+        filter.map_or(0.0, |f| f.violation(&self.state.positions))
+    }
+
     /// Panel of each vertex.
     pub fn vertex_panels(&self) -> &[u32] {
         &self.mesh.vertex_panel
@@ -162,15 +183,20 @@ impl Sim {
         let engine = self.engine();
         let system = &engine.system;
         let points = &system.points;
+        let filter = points.coupling.filter.as_ref();
+        let rows = filter.map_or(0, |f| f.width());
         let moving = (0..points.count()).filter(|p| points.moves(*p)).count();
         SystemInfo {
             vertices: self.mesh.uv.len(),
             triangles: self.mesh.triangles.len(),
             active_triangles: system.cloth.mesh.triangles.len(),
             yarn_nodes: self.yarn_nodes().len(),
-            carried_nodes: points.riders.list().len(),
+            carried_nodes: points.coupling.riders.list().len(),
+            hybrid_nodes: filter.map_or(0, |f| f.nodes().len()),
+            hybrid_vertices: filter.map_or([0; 2], |f| [f.kept().len(), f.dropped().len()]),
+            amplification: filter.map_or(0.0, |f| f.amplification()),
             yarns: self.yarns().map_or(0, YarnMesh::yarn_count),
-            unknowns: 3 * (moving - self.state.pins.len()) + system.unknowns.sliding(),
+            unknowns: 3 * (moving - self.state.pins.len() - rows) + system.unknowns.sliding(),
             terms: system
                 .terms
                 .iter()

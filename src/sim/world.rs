@@ -1,6 +1,6 @@
 //! The world around the cloth: bodies and their motion, positions, numbers.
 
-use super::{ContactSettings, Sim, finite, finite_points};
+use super::{ContactSettings, Settings, Sim, finite, finite_points};
 use crate::body::{Body, Pose};
 use crate::error::{Error, Result};
 use crate::math::{Rotation, Vec3};
@@ -177,6 +177,12 @@ impl Sim {
         } else {
             let mut settings = self.settings.clone();
             settings.set(name, value)?;
+            let made = |s: &Settings| [s.blend_means, s.blend_enrich].map(f64::to_bits);
+            if self.yarns.is_some() && made(&settings) != made(&self.settings) {
+                return Err(Error::state(format!(
+                    "{name} is taken when a simulation is made, and this one has yarns already"
+                )));
+            }
             self.engine().set_settings(&settings)?;
             self.origin.numbers = settings.that_matter();
             self.settings = settings;

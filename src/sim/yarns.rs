@@ -1,9 +1,9 @@
 //! Yarns of a simulation: where they are, what holds them, and the vertices that follow them.
 
 use super::Sim;
+use crate::blend::blended::{self, BlendOptions};
 use crate::blend::embed::carried;
-use crate::blend::region::yarn_triangles;
-use crate::blend::{Direct, Follow, Riders};
+use crate::blend::{Coupling, Filter, Follow, Joined, Region, direct};
 use crate::cloth::Cloth;
 use crate::error::{Error, Result};
 use crate::math::Vec3;
@@ -25,11 +25,12 @@ pub(super) struct YarnPart {
     topology: Topology,
     /// Grows whenever `now` changes.
     epoch: u64,
-    /// Nodes that ride on triangles.
-    pub(super) riders: Riders,
+    /// What joins them to the triangles.
+    pub(super) coupling: Coupling,
     /// Triangles that the yarns stand for.
     left_out: Vec<bool>,
     share: Vec<[f64; 2]>,
+    own: Vec<f64>,
     masses: Vec<Option<f64>>,
     follow: Follow,
 }
@@ -41,7 +42,8 @@ impl YarnPart {
         mesh: &GarmentMesh,
         settings: &Settings,
     ) -> Result<Option<Self>> {
-        let left_out = yarn_triangles(garment, mesh)?;
+        let region = Region::new(garment, mesh)?;
+        let left_out = region.full.clone();
         let mut wanted: Vec<u32> = (left_out.iter().zip(&mesh.triangle_panel))
             .filter(|(left_out, _)| **left_out)
             .map(|p| *p.1)
@@ -62,8 +64,23 @@ impl YarnPart {
             .iter()
             .map(|f| f.yarns.as_ref().map(YarnMaterial::from).unwrap_or_default())
             .collect();
-        let direct = Direct::new(garment, mesh, &left_out, laid, &materials)?;
-        direct.yarns.check()?;
+        let options = BlendOptions {
+            means: settings.blend_means > 0.5,
+            everywhere: settings.blend_enrich > 0.5,
+        };
+        let joined = if options.everywhere || region.hybrid.contains(&true) {
+            blended::join(garment, mesh, &region, laid, &materials, options)?
+        } else {
+            direct::join(garment, mesh, &left_out, laid, &materials)?
+        };
+        let Joined {
+            yarns,
+            coupling,
+            share,
+            own,
+            masses,
+        } = joined;
+        yarns.check()?;
         let mut follows = vec![false; mesh.uv.len()];
         for gone in [true, false] {
             let list = mesh.triangles.iter().zip(&left_out);
@@ -73,16 +90,20 @@ impl YarnPart {
                 }
             }
         }
+        for v in coupling.filter.iter().flat_map(|f| f.bare()) {
+            follows[*v as usize] = false;
+        }
         let reach = |panel: u32| garment.panel_edge_length(&garment.panels[panel as usize]);
-        let follow = Follow::new(mesh, &direct.yarns, &follows, reach)?;
+        let follow = Follow::new(mesh, &yarns, &follows, reach)?;
         Ok(Some(Self {
-            now: Arc::new(Yarns::laid(direct.yarns, materials)),
+            now: Arc::new(Yarns::laid(yarns, materials)),
             topology: Topology::default(),
             epoch: 1,
-            riders: direct.riders,
+            coupling,
             left_out,
-            share: direct.share,
-            masses: direct.masses,
+            share,
+            own,
+            masses,
             follow,
         }))
     }
@@ -93,9 +114,10 @@ impl YarnPart {
             .filter(|t| !self.left_out[*t])
             .collect();
         let share: Vec<[f64; 2]> = kept.iter().map(|t| self.share[*t]).collect();
+        let own: Vec<f64> = kept.iter().map(|t| self.own[*t]).collect();
         let masses: Vec<_> = kept.iter().map(|t| self.masses[*t]).collect();
         let mesh = mesh.without_triangles(&self.left_out);
-        Cloth::covered(garment, mesh, &share, &masses)
+        Cloth::covered(garment, mesh, share, own, &masses)
     }
 
     /// Adds the nodes, where the panels are placed, to a state of the vertices.
@@ -116,14 +138,15 @@ impl YarnPart {
         state.strands = loose(mesh, &state.u);
         state.yarn_normals = vec![Vec3::zeros(); mesh.uv.len()];
         // vertices stay exactly where they are placed: a drape asks whether they do
-        self.riders.carry(&mut state.positions);
+        self.coupling.carry(&mut state.positions);
     }
 
-    /// Lets riders ride and vertices follow.
+    /// Puts points where their coupling has them and lets vertices follow.
     pub(super) fn carry(&self, state: &mut State) {
         let first = state.positions.len() - self.now.mesh.uv.len();
         for values in [&mut state.positions, &mut state.velocities] {
-            self.riders.carry(values);
+            // constraints hold already: projected again, states that did not change would
+            self.coupling.riders.carry(values);
             let (vertices, nodes) = values.split_at_mut(first);
             self.follow.apply(nodes, vertices);
         }
@@ -136,14 +159,16 @@ impl YarnPart {
             let nodes = carried(mesh, &values[..first], &self.now.mesh)?;
             values.truncate(first);
             values.extend(nodes);
-            self.riders.carry(values);
+            self.coupling.carry(values);
         }
         Ok(())
     }
 
     /// Whether a vertex follows.
     pub(super) fn follows(&self, vertex: u32) -> bool {
+        let bare = |f: &Arc<Filter>| f.bare().binary_search(&vertex).is_ok();
         self.follow.vertices.binary_search(&vertex).is_ok()
+            || self.coupling.filter.as_ref().is_some_and(bare)
     }
 }
 
@@ -258,7 +283,11 @@ impl Sim {
     /// For each node of the yarns whether it moves by itself; triangles carry the others.
     pub fn active_yarn_nodes(&self) -> Vec<bool> {
         let nodes = self.mesh.uv.len() as u32..self.state.positions.len() as u32;
-        let rides = |n| self.yarns.as_ref().is_some_and(|part| part.riders.rides(n));
+        let rides = |n| {
+            self.yarns
+                .as_ref()
+                .is_some_and(|part| part.coupling.riders.rides(n))
+        };
         nodes.map(|n| !rides(n)).collect()
     }
 

@@ -4,6 +4,7 @@ mod present;
 
 use super::admissible::inadmissible;
 use super::carry::Carry;
+use super::linear::constrained::Constrained;
 use super::linear::direct::Direct;
 use super::linear::ordering::seam_priorities;
 use super::linear::{LinearSolver, choose};
@@ -34,7 +35,7 @@ pub struct Engine {
     assembler: Assembler,
     linear: Box<dyn LinearSolver>,
     /// Solves at rest, where the exact Hessian has to be factored as it is.
-    direct: Direct,
+    direct: Box<dyn LinearSolver>,
     workers: Workers,
     work: Work,
     weight: Vec<f64>,
@@ -80,13 +81,13 @@ impl Engine {
     /// A solver for a system.
     pub fn new(system: System, settings: &Settings) -> Self {
         let n = system.block_count();
-        let assembler = Assembler::new(n, &system.terms, &system.points.riders);
+        let assembler = Assembler::new(n, &system.terms, &system.points.coupling.riders);
         let workers = Workers::new(settings.threads as usize);
         let linear = linear_solver(&system, settings, &workers);
         Self {
             assembler,
             linear,
-            direct: Direct::new(&workers),
+            direct: exact_solver(&system, &workers),
             workers,
             work: Work::default(),
             weight: Vec::new(),
@@ -107,7 +108,7 @@ impl Engine {
         let threads = settings.threads.to_bits() != self.settings.threads.to_bits();
         if threads {
             self.workers = Workers::new(settings.threads as usize);
-            self.direct = Direct::new(&self.workers);
+            self.direct = exact_solver(&self.system, &self.workers);
         }
         if threads || settings.linear_kind.to_bits() != self.settings.linear_kind.to_bits() {
             self.linear = linear_solver(&self.system, settings, &self.workers);
@@ -206,14 +207,14 @@ impl Engine {
                 x[i] = place;
             }
         }
-        let riders = &self.system.points.riders;
-        riders.carry(&mut x);
+        let coupling = &self.system.points.coupling;
+        coupling.carry(&mut x);
         self.carry.way.clear();
         if rest {
             self.carry
                 .take_along(state, &self.center, &self.fixed, &self.system.bodies);
             if !self.carry.way.is_empty() {
-                riders.carry(&mut self.carry.way);
+                coupling.carry(&mut self.carry.way);
             }
         }
         let n = x.len();
@@ -252,7 +253,7 @@ impl Engine {
                 measure: &self.measure,
             },
             fixed: &self.fixed,
-            riders: &system.points.riders,
+            coupling: &system.points.coupling,
             idle: &self.idle,
             workers: &self.workers,
         };
@@ -300,8 +301,8 @@ impl Engine {
             hasty: system.has_yarns(),
             strict: rest,
         };
-        let linear: &mut dyn LinearSolver = if rest {
-            &mut self.direct
+        let linear = if rest {
+            self.direct.as_mut()
         } else {
             self.linear.as_mut()
         };
@@ -327,7 +328,7 @@ impl Engine {
             for pin in &state.pins {
                 x[pin.vertex as usize] = self.center[pin.vertex as usize];
             }
-            problem.riders.carry(&mut x);
+            problem.coupling.carry(&mut x);
             // where that costs energy everything but the pins is left behind
             if let Some(answer) = answer.1
                 && problem.value(&answer) <= problem.value(&x)
@@ -406,7 +407,14 @@ impl Engine {
             }
             self.fixed[i] = !points.moves(i);
         }
-        for rider in points.riders.list() {
+        for node in points.coupling.filter.iter().flat_map(|f| f.nodes()) {
+            // inertia alone resists what is done to a vertex with that of the nodes on it
+            let own = self.measure[node.point as usize];
+            for (v, w) in node.vertices.iter().zip(&node.weights) {
+                self.measure[*v as usize] += w.max(0.0) * own;
+            }
+        }
+        for rider in points.coupling.riders.list() {
             let own = self.measure[rider.point as usize];
             for (v, w) in rider.vertices.iter().zip(&rider.weights) {
                 // a rider just outside of its triangle has a weight below zero
@@ -438,7 +446,18 @@ impl Engine {
     }
 }
 
+/// The solver that factors every matrix as it is.
+fn exact_solver(system: &System, workers: &Workers) -> Box<dyn LinearSolver> {
+    match &system.points.coupling.filter {
+        Some(filter) => Box::new(Constrained::new(filter, workers)),
+        None => Box::new(Direct::new(workers)),
+    }
+}
+
 fn linear_solver(system: &System, settings: &Settings, workers: &Workers) -> Box<dyn LinearSolver> {
+    if system.points.coupling.filter.is_some() {
+        return exact_solver(system, workers);
+    }
     let priorities = (!system.has_yarns()).then(|| seam_priorities(&system.cloth.mesh));
     let blocks = system.block_count();
     let kind = match settings.linear_kind as u32 {

@@ -8,7 +8,7 @@
 //! uses the same with `v0 = 0`. No step is accepted that raises `Phi`.
 
 use super::linear::{LinearError, LinearSolver};
-use crate::blend::Riders;
+use crate::blend::Coupling;
 use crate::error::{Error, Result, Status};
 use crate::math::Vec3;
 use crate::math::block::BlockMatrix;
@@ -101,8 +101,8 @@ pub struct Problem<'a> {
     pub inertia: Inertia<'a>,
     /// Vertices that keep their place, and points that ride.
     pub fixed: &'a [bool],
-    /// Points that ride on vertices.
-    pub riders: &'a Riders,
+    /// What joins points to each other.
+    pub coupling: &'a Coupling,
     /// Block and component of entries that nothing depends on.
     pub idle: &'a [(u32, u8)],
     /// Threads.
@@ -113,6 +113,8 @@ pub struct Problem<'a> {
 #[derive(Debug, Default)]
 pub struct Work {
     gradient: Vec<Vec3>,
+    /// The gradient by coordinates that are independent.
+    gathered: Vec<Vec3>,
     negative: Vec<Vec3>,
     direction: Vec<Vec3>,
     trial: Vec<Vec3>,
@@ -122,6 +124,7 @@ impl Work {
     fn resize(&mut self, n: usize) {
         for v in [
             &mut self.gradient,
+            &mut self.gathered,
             &mut self.negative,
             &mut self.direction,
             &mut self.trial,
@@ -157,14 +160,32 @@ impl Problem<'_> {
         inertia + energy(self.terms, &self.at(x), self.workers)
     }
 
+    /// Force on what moves, as large as it is anywhere [N].
+    fn size(&self, gradient: &[Vec3], gathered: &mut [Vec3]) -> f64 {
+        if self.coupling.filter.is_none() {
+            return largest(gradient);
+        }
+        gathered.copy_from_slice(gradient);
+        self.coupling.gather(gathered);
+        for (g, fixed) in gathered.iter_mut().zip(self.fixed) {
+            if *fixed {
+                g.fill(0.0);
+            }
+        }
+        largest(gathered)
+    }
+
     fn derivatives(
         &self,
         x: &[Vec3],
         kind: HessianKind,
         way: Option<&[Vec3]>,
         assembler: &mut Assembler,
-        gradient: &mut [Vec3],
+        work: &mut Work,
     ) -> f64 {
+        let Work {
+            gradient, gathered, ..
+        } = work;
         gradient.fill(Vec3::zeros());
         let matrix: &mut BlockMatrix = assembler.matrix_mut();
         for block in &mut matrix.blocks {
@@ -192,7 +213,7 @@ impl Problem<'_> {
                 g.fill(0.0);
             }
         }
-        let residual = largest(gradient);
+        let residual = self.size(gradient, gathered);
         for (i, g) in gradient.iter_mut().enumerate() {
             if !self.fixed[i] {
                 *g += (x[i] - self.inertia.center[i]) * self.inertia.weight[i];
@@ -212,6 +233,9 @@ impl Problem<'_> {
                 continue;
             }
             *g += (x[i] - self.inertia.center[i]) * self.inertia.weight[i];
+        }
+        self.coupling.gather(gradient);
+        for (i, g) in gradient.iter().enumerate().filter(|(i, _)| !self.fixed[*i]) {
             let size = g.norm();
             force = force.max(size);
             reach = reach.max(size / self.inertia.measure[i]);
@@ -230,10 +254,11 @@ impl Problem<'_> {
         work: &mut Work,
     ) -> (u32, Option<Vec<Vec3>>) {
         work.resize(x.len());
+        linear.hold(self.fixed);
         let mut tried = 0;
         for kind in [HessianKind::Exact, HessianKind::Psd] {
             tried += 1;
-            self.derivatives(x, kind, Some(way), assembler, &mut work.gradient);
+            self.derivatives(x, kind, Some(way), assembler, work);
             for (m, g) in work.negative.iter_mut().zip(&work.gradient) {
                 *m = -g;
             }
@@ -242,7 +267,7 @@ impl Problem<'_> {
                 .prepare(matrix)
                 .and_then(|()| linear.solve(matrix, &work.negative, &mut work.direction, 0.0));
             if solved.is_ok() {
-                self.riders.carry(&mut work.direction);
+                self.coupling.carry(&mut work.direction);
                 // the rows of fixed vertices have no answer
                 let moved = x.iter().zip(way).zip(&work.direction);
                 return (tried, Some(moved.map(|((x, w), d)| x + w + d).collect()));
@@ -260,7 +285,8 @@ impl Problem<'_> {
         work: &mut Work,
     ) -> bool {
         work.resize(x.len());
-        self.derivatives(x, HessianKind::Exact, None, assembler, &mut work.gradient);
+        linear.hold(self.fixed);
+        self.derivatives(x, HessianKind::Exact, None, assembler, work);
         linear.prepare(assembler.matrix()).is_ok()
     }
 
@@ -275,6 +301,7 @@ impl Problem<'_> {
     ) -> Result<Summary> {
         let n = x.len();
         work.resize(n);
+        linear.hold(self.fixed);
         let mut summary = Summary::default();
         let mut value = self.value(x);
         if !value.is_finite() {
@@ -291,8 +318,8 @@ impl Problem<'_> {
                 } else {
                     HessianKind::Part(exactness)
                 };
-                let still = self.derivatives(x, kind, None, assembler, &mut work.gradient);
-                summary.residual = largest(&work.gradient);
+                let still = self.derivatives(x, kind, None, assembler, work);
+                summary.residual = self.size(&work.gradient, &mut work.gathered);
                 if iteration == 0 {
                     summary.static_residual = still;
                 }
@@ -318,7 +345,7 @@ impl Problem<'_> {
                 });
                 match solved {
                     Ok(iterations) => {
-                        self.riders.carry(&mut work.direction);
+                        self.coupling.carry(&mut work.direction);
                         summary.linear_iterations += u64::from(iterations);
                         summary.exactness = kind.exactness();
                         break;

@@ -120,7 +120,7 @@ settings! {
     drape_max_steps: "solver.drape.max_steps" = 2000.0, 1.0, 1e7, "1" whole;
     /// Coarse levels used by a drape from the flat panels, 0 for none.
     drape_levels: "solver.drape.levels" = 1.0, 0.0, 4.0, "1" whole;
-    /// Linear solver: 0 chooses for each matrix, 1 sparse Cholesky, 2 conjugate gradients with block Jacobi, 3 with incomplete Cholesky, 4 with the Cholesky factor of an earlier matrix.
+    /// Linear solver: 0 chooses for each matrix, 1 sparse Cholesky, 2 conjugate gradients with block Jacobi, 3 with incomplete Cholesky, 4 with the Cholesky factor of an earlier matrix. With hybrid rings it is direct whatever this says.
     linear_kind: "solver.linear.kind" = 0.0, 0.0, 4.0, "1" whole;
     /// Relative residual at which conjugate gradients stop.
     linear_tolerance: "solver.linear.tolerance" = 1e-3, 1e-14, 0.5, "1";
@@ -140,6 +140,10 @@ settings! {
     yarn_relative_velocity: "yarn.relative_velocity" = 1e-3, 0.0, 0.5, "1";
     /// Inertia forces of yarn that slides: 1 on, 0 off.
     yarn_inertia: "yarn.inertia_forces" = 1.0, 0.0, 1.0, "1" whole;
+    /// In hybrid rings, whether the mean displacement of the nodes beside each triangle is held at zero: 1 yes, 0 no. Taken when a simulation is made.
+    blend_means: "blend.means" = 0.0, 0.0, 1.0, "1" whole;
+    /// Whether yarns are enriched by triangles where they are alone too, which changes nothing but the work: 1 yes, for tests, 0 no. Taken when a simulation is made.
+    blend_enrich: "blend.enrich_everywhere" = 0.0, 0.0, 1.0, "1" whole;
     /// Quadratic drag of the air along the normal, times density of air.
     air_drag: "air.drag" = 1.2, 0.0, 1e3, "kg/m^3";
     /// Tangential drag (skin friction) of the air, times density of air.

@@ -16,6 +16,8 @@ use crate::math::{Mat3, Vec3};
 /// Air on every triangle.
 pub struct Air {
     vertices: Vec<u32>,
+    /// Part of each triangle that is its own.
+    own: Vec<f64>,
     normal: f64,
     tangent: f64,
 }
@@ -33,6 +35,7 @@ impl Air {
     pub fn new(cloth: &Cloth, normal: f64, tangent: f64) -> Self {
         Self {
             vertices: cloth.mesh.triangles.iter().flatten().copied().collect(),
+            own: cloth.own.clone(),
             normal,
             tangent,
         }
@@ -50,7 +53,7 @@ impl Air {
         let velocity = moved * (at.inv_dt / 3.0) - at.world.wind;
         let along_normal = velocity.dot(&normal);
         Some(Flow {
-            area: 0.5 * length,
+            area: 0.5 * length * self.own[e],
             normal,
             along_normal,
             tangential: velocity - normal * along_normal,

@@ -324,9 +324,24 @@ fn measure_with_rate(uv: &[Vec2], duv: &[Vec2], kind: FanKind) -> (Measure, Meas
     (m, dm)
 }
 
+/// Part of the bending at each vertex that is its own: the mean over the triangles around it.
+fn parts(cloth: &Cloth) -> Vec<f64> {
+    let mut areas = vec![0.0; cloth.mesh.uv.len()];
+    let triangles = cloth.mesh.triangles.iter().zip(&cloth.areas);
+    for v in triangles.flat_map(|(tri, area)| tri.map(|v| (v, area / 3.0))) {
+        areas[v.0 as usize] += v.1;
+    }
+    let parts = cloth.vertex_areas.iter().zip(areas);
+    parts
+        .map(|(own, all)| if all > 0.0 { own / all } else { 1.0 })
+        .collect()
+}
+
 /// Fans of all panels whose fabric asks for `model`, grouped by arity.
 pub(super) fn fan_groups(cloth: &Cloth, model: BendingModel) -> Vec<FanGroup> {
     let mesh = &cloth.mesh;
+    let part = parts(cloth);
+    let part = |v: u32| part[v as usize];
     let mut groups: BTreeMap<usize, FanGroup> = BTreeMap::new();
     let mut add = |center: u32, ring: &[u32], kind: FanKind| {
         let panel = mesh.vertex_panel[center as usize] as usize;
@@ -352,7 +367,7 @@ pub(super) fn fan_groups(cloth: &Cloth, model: BendingModel) -> Vec<FanGroup> {
             .map(|(i, j)| cross2(&(uv[i] - uv[0]), &(uv[j] - uv[0])).abs())
             .fold(f64::INFINITY, f64::min);
         let (measure, _) = measure_with_rate(&uv, &vec![Vec2::zeros(); uv.len()], kind);
-        let rigidity = rigidity(fabric);
+        let rigidity = rigidity(fabric) * part(center);
         group.fans.push(FanRest {
             kind,
             fabric: cloth.panel_fabric[panel],

@@ -17,7 +17,7 @@ use super::term::{Bodies, Term};
 use super::yarn::contacts::{Contacts, Sliding};
 use super::yarn::unknowns::Unknowns;
 use super::yarn::{self, YarnOptions};
-use crate::blend::Riders;
+use crate::blend::Coupling;
 use crate::cloth::Cloth;
 use crate::error::Result;
 use crate::math::parallel::Workers;
@@ -86,19 +86,19 @@ impl From<&BuildOptions> for YarnOptions {
 impl System {
     /// Compiles a garment of triangles alone; bodies come later.
     pub fn new(cloth: Cloth, options: &BuildOptions) -> Result<Self> {
-        Self::with_yarns(cloth, None, &Riders::default(), options)
+        Self::with_yarns(cloth, None, Coupling::default(), options)
     }
 
-    /// Compiles a garment whose yarns, as laid, are simulated where the cloth has no triangles; at the
-    /// border some of their nodes ride on triangles.
+    /// Compiles a garment whose yarns, as laid, are simulated where the cloth has no triangles, and
+    /// how they are joined to those there are.
     pub fn with_yarns(
         cloth: Cloth,
         yarns: Option<Arc<Yarns>>,
-        riders: &Riders,
+        coupling: Coupling,
         options: &BuildOptions,
     ) -> Result<Self> {
         let points = Points {
-            riders: riders.clone(),
+            coupling,
             ..Points::new(&cloth, yarns.as_deref())
         };
         let sliding = vec![false; yarns.as_ref().map_or(0, |y| y.mesh.incidences.len())];
@@ -177,10 +177,10 @@ impl System {
         let now = Arc::new(now);
         let options = YarnOptions::from(&self.options);
         self.contacts = Some(Contacts::new(laid, now.clone(), &options)?);
-        // nodes that come in are counted on after those that ride
-        let riders = std::mem::take(&mut self.points.riders);
+        // nodes that come in are counted on after those that are joined to triangles
+        let coupling = std::mem::take(&mut self.points.coupling);
         self.points = Points {
-            riders,
+            coupling,
             ..Points::new(&self.cloth, Some(&now))
         };
         self.yarns = Some(now);
@@ -207,11 +207,11 @@ impl System {
         self.take_contacts(state)
     }
 
-    /// Values of all blocks in a state, riders where their triangles are.
+    /// Values of all blocks in a state, points where their coupling has them.
     pub fn pack(&self, state: &State, x: &mut Vec<Vec3>) {
         x.clear();
         x.extend_from_slice(&state.positions);
-        self.points.riders.carry(x);
+        self.points.coupling.carry(x);
         x.resize(self.block_count(), Vec3::zeros());
         for (u, slot) in state.u.iter().zip(&self.unknowns.slides) {
             if let Some((block, c)) = slot {
@@ -273,7 +273,9 @@ impl System {
         let links = mesh.seams.iter().flat_map(|s| &s.links);
         let sewn = links.flat_map(|l| [[l.vertex, l.edge[0]], [l.vertex, l.edge[1]]]);
         let node = |n| self.unknowns.node(n);
-        let riders = self.points.riders.list().iter();
+        let coupling = &self.points.coupling;
+        let blended = coupling.filter.iter().flat_map(|f| f.nodes());
+        let riders = coupling.riders.list().iter().chain(blended);
         let ridden = riders.flat_map(|r| r.vertices.map(|v| [r.point, v]));
         let yarns = self.yarns.iter().flat_map(|y| {
             let ties = y.mesh.ties.iter().map(|t| [t.node, t.segment[0]]);

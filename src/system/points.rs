@@ -3,14 +3,15 @@
 //! A vertex stands for a third of the triangles around it, a node for half of the yarn between it
 //! and its neighbours; a yarn of radius `R` covers `2 R` of the surface. A vertex without triangles
 //! does not move by itself: it follows the yarns laid where it is. Nor does a node that rides on
-//! triangles.
+//! triangles. Where both are in part, each stands for its part.
 
-use crate::blend::Riders;
+use crate::blend::{Coupling, Filter};
 use crate::cloth::Cloth;
 use crate::yarn::Yarns;
+use std::sync::Arc;
 
 /// Numbers of every point, vertices first.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default)]
 pub struct Points {
     /// Lumped mass [kg].
     pub masses: Vec<f64>,
@@ -22,12 +23,12 @@ pub struct Points {
     pub radii: Vec<f64>,
     /// Number of vertices.
     pub vertex_count: usize,
-    /// Nodes that ride on triangles.
-    pub riders: Riders,
+    /// What joins yarns and triangles.
+    pub coupling: Coupling,
 }
 
 impl Points {
-    /// Points of a cloth and, if there are any, of yarns; nothing rides.
+    /// Points of a cloth and, if there are any, of yarns, joined by nothing.
     pub fn new(cloth: &Cloth, yarns: Option<&Yarns>) -> Self {
         let n = cloth.mesh.uv.len();
         let mut points = Self {
@@ -36,7 +37,7 @@ impl Points {
             damping: vec![0.0; n],
             radii: vec![0.0; n],
             vertex_count: n,
-            riders: Riders::default(),
+            coupling: Coupling::default(),
         };
         for (d, panel) in points.damping.iter_mut().zip(&cloth.mesh.vertex_panel) {
             *d = cloth.fabrics[cloth.panel_fabric[*panel as usize]].damping_mass;
@@ -64,7 +65,8 @@ impl Points {
                 if !yarns.mesh.reaches(&[pair[0].node, pair[1].node]) {
                     continue;
                 }
-                let half = 0.5 * (pair[1].u - pair[0].u);
+                let part = yarns.mesh.weight(&[pair[0].node, pair[1].node]);
+                let half = 0.5 * (pair[1].u - pair[0].u) * part;
                 for end in pair {
                     let p = self.vertex_count + end.node as usize;
                     self.masses[p] += material.density * half;
@@ -83,6 +85,8 @@ impl Points {
 
     /// Whether the point moves by itself.
     pub fn moves(&self, point: usize) -> bool {
-        self.areas[point] > 0.0 && !self.riders.rides(point as u32)
+        let free = |f: &Arc<Filter>| f.keeps(point as u32);
+        (self.areas[point] > 0.0 || self.coupling.filter.as_ref().is_some_and(free))
+            && !self.coupling.riders.rides(point as u32)
     }
 }

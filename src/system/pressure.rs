@@ -13,6 +13,8 @@ use crate::math::{Mat3, Vec3};
 /// Pressure of the inside on the outside on every triangle.
 pub struct Pressure {
     vertices: Vec<u32>,
+    /// Part of each triangle that is its own.
+    own: Vec<f64>,
 }
 
 impl Pressure {
@@ -20,13 +22,14 @@ impl Pressure {
     pub fn new(cloth: &Cloth) -> Self {
         Self {
             vertices: cloth.mesh.triangles.iter().flatten().copied().collect(),
+            own: cloth.own.clone(),
         }
     }
 
     /// Force on each vertex of a triangle.
     fn force(&self, e: usize, at: &Configuration<'_>) -> Vec3 {
         let [a, b, c] = [0, 1, 2].map(|k| at.x0[self.vertices[3 * e + k] as usize]);
-        (b - a).cross(&(c - a)) * (at.world.pressure / 6.0)
+        (b - a).cross(&(c - a)) * (at.world.pressure * self.own[e] / 6.0)
     }
 }
 

@@ -97,6 +97,15 @@ impl YarnMesh {
                 self.outside.len()
             ));
         }
+        if ![0, nodes].contains(&self.alpha.len()) {
+            return refuse(format!(
+                "alpha has {} entries, must have none or {nodes}",
+                self.alpha.len()
+            ));
+        }
+        if let Some(k) = self.alpha.iter().position(|a| !(0.0..=1.0).contains(a)) {
+            return refuse(format!("node {k}: alpha is {}", self.alpha[k]));
+        }
         if let Some(bad) = self.across.iter().find(|a| a.node as usize >= nodes) {
             return refuse(format!("across: node {} of {nodes}", bad.node));
         }

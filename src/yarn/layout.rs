@@ -105,7 +105,8 @@ impl YarnMesh {
             + size_of_val(&self.spacings[..])
             + size_of_val(&self.ties[..])
             + size_of_val(&self.across[..])
-            + size_of_val(&self.outside[..]);
+            + size_of_val(&self.outside[..])
+            + size_of_val(&self.alpha[..]);
         Counts {
             nodes: self.uv.len(),
             yarns: self.yarn_count(),

@@ -62,6 +62,8 @@ pub struct YarnMesh {
     /// Nodes that are there only because energies of other nodes reach them; empty where there are
     /// none, as in whole panels. See [`part`].
     pub outside: Vec<bool>,
+    /// `alpha` of each node: how much of the cloth there its yarns are; empty where they are all of it.
+    pub alpha: Vec<f64>,
 }
 
 /// Yarns and what they are made of.
@@ -195,6 +197,22 @@ impl YarnMesh {
         nodes.iter().any(|n| self.is_inside(*n))
     }
 
+    /// Least and one minus largest `alpha` of an energy that is not whole.
+    pub const LEAST_ALPHA: f64 = 0.01;
+
+    /// Part of an energy over these nodes that is the yarns'.
+    pub fn weight(&self, nodes: &[u32]) -> f64 {
+        if self.alpha.is_empty() {
+            return 1.0;
+        }
+        blended_weight_of(nodes.iter().map(|n| self.alpha[*n as usize]))
+    }
+
+    /// Whether the cloth at a node is its yarns alone.
+    pub fn is_whole(&self, node: u32) -> bool {
+        self.is_inside(node) && self.weight(&[node]) == 1.0
+    }
+
     /// Number of yarns.
     pub fn yarn_count(&self) -> usize {
         self.yarn_fabric.len()
@@ -214,5 +232,20 @@ impl YarnMesh {
     /// Strands at one node, from the back to the front.
     pub fn stack(&self, node: usize) -> &[Strand] {
         &self.stacks[self.stack_starts[node] as usize..self.stack_starts[node + 1] as usize]
+    }
+}
+
+/// Weight of an element with these values of `alpha`: their mean, kept from both ends unless all are 1.
+pub fn blended_weight(alpha: &[f64]) -> f64 {
+    blended_weight_of(alpha.iter().copied())
+}
+
+fn blended_weight_of(alpha: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let count = alpha.len() as f64;
+    let mean = alpha.sum::<f64>() / count;
+    if mean >= 1.0 {
+        1.0
+    } else {
+        mean.clamp(YarnMesh::LEAST_ALPHA, 1.0 - YarnMesh::LEAST_ALPHA)
     }
 }

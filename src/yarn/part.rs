@@ -4,11 +4,14 @@
 //! its nodes lies in the region (Casafranca et al. 2020 blend them; cutting them at the border instead makes a
 //! stretched patch err by ten times more). So the part has the nodes inside, and further the nodes outside
 //! that a segment, a bend, a corner, a stitch or a tie of an inside node needs. Those keep the material
-//! coordinates that they were laid with: yarns do not slide there, and a yarn that leaves the part ends.
+//! coordinates that they were laid with: yarns do not slide there, and a yarn that leaves the part ends. Nor do yarns slide where an energy
+//! is in part the triangles': it would cost less to be stretched there, and material would gather.
 
 use super::{Across, Corner, Incidence, Spacing, StitchSpring, Strand, Tie, Wrap, YarnMesh};
 
 const NONE: u32 = u32::MAX;
+/// Passages beside one that an energy by its coordinate reaches.
+const REACH: usize = 2;
 
 impl YarnMesh {
     /// The part that the nodes with `inside` reach, and the number that each of its nodes has here.
@@ -45,6 +48,9 @@ impl YarnMesh {
             lift: nodes.iter().map(|n| self.lift[pick(n)]).collect(),
             node_panel: nodes.iter().map(|n| self.node_panel[pick(n)]).collect(),
             outside: nodes.iter().map(|n| !inside[pick(n)]).collect(),
+            alpha: (nodes.iter().filter(|_| !self.alpha.is_empty()))
+                .map(|n| self.alpha[pick(n)])
+                .collect(),
             starts: vec![0],
             stack_starts: vec![0],
             ..Self::default()
@@ -52,13 +58,24 @@ impl YarnMesh {
         let mut passages = vec![NONE; self.incidences.len()];
         for (y, range) in pieces {
             let (first, last) = (range.start, range.end - 1);
-            for i in range {
+            let whole = |i: usize| part.is_whole(ids[self.incidences[i].node as usize]);
+            let may_slide: Vec<bool> = range
+                .clone()
+                .map(|i| {
+                    let near = i.saturating_sub(REACH).max(first)..=(i + REACH).min(last);
+                    i != first
+                        && i != last
+                        && inside[self.incidences[i].node as usize]
+                        && (part.alpha.is_empty() || near.into_iter().all(whole))
+                })
+                .collect();
+            for (i, may_slide) in range.zip(may_slide) {
                 let Incidence { node, u, slides } = self.incidences[i];
                 passages[i] = part.incidences.len() as u32;
                 part.incidences.push(Incidence {
                     node: ids[node as usize],
                     u,
-                    slides: slides && inside[node as usize] && i != first && i != last,
+                    slides: slides && may_slide,
                 });
             }
             part.starts.push(part.incidences.len() as u32);

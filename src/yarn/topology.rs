@@ -99,6 +99,7 @@ fn present(laid: &YarnMesh, topology: &Topology) -> Result<(YarnMesh, Vec<u32>)>
         yarn_family: laid.yarn_family.clone(),
         ties: laid.ties.clone(),
         outside: laid.outside.clone(),
+        alpha: laid.alpha.clone(),
         starts: vec![0],
         ..YarnMesh::default()
     };
@@ -112,6 +113,9 @@ fn present(laid: &YarnMesh, topology: &Topology) -> Result<(YarnMesh, Vec<u32>)>
         mesh.node_panel.push(laid.node_panel[o]);
         if !mesh.outside.is_empty() {
             mesh.outside.push(false);
+        }
+        if !mesh.alpha.is_empty() {
+            mesh.alpha.push(laid.alpha[o]);
         }
     }
     let mut passages = Vec::with_capacity(count);

@@ -100,6 +100,12 @@ pub(crate) fn info(args: &SceneArgs) -> Done {
         row("active triangles", info.active_triangles.to_string());
         row("yarn nodes", info.yarn_nodes.to_string());
         row("carried nodes", info.carried_nodes.to_string());
+        if info.hybrid_nodes > 0 {
+            let [kept, dropped] = info.hybrid_vertices;
+            row("hybrid nodes", info.hybrid_nodes.to_string());
+            row("hybrid vertices", format!("{kept} and {dropped} left out"));
+            row("amplification", format!("{:.2}", info.amplification));
+        }
     }
     row("unknowns", info.unknowns.to_string());
     row(

@@ -87,8 +87,11 @@ impl Summary {
         put("triangles", json!(info.triangles));
         put("yarn_nodes", json!(info.yarn_nodes));
         put("yarns", json!(info.yarns));
-        put("full_nodes", json!(info.yarn_nodes - info.carried_nodes));
-        put("hybrid_nodes", json!(0));
+        put(
+            "full_nodes",
+            json!(info.yarn_nodes - info.carried_nodes - info.hybrid_nodes),
+        );
+        put("hybrid_nodes", json!(info.hybrid_nodes));
         put("carried_nodes", json!(info.carried_nodes));
         put("active_triangles", json!(info.active_triangles));
         put("unknowns", json!(info.unknowns));

@@ -31,14 +31,14 @@ impl Engine {
                     center: &engine.center,
                 },
                 fixed: &engine.fixed,
-                riders: &engine.system.points.riders,
+                coupling: &engine.system.points.coupling,
                 idle: &engine.idle,
                 workers: &engine.workers,
             };
             problem.is_convex(
                 at.x,
                 &mut engine.assembler,
-                &mut engine.direct,
+                engine.direct.as_mut(),
                 &mut engine.work,
             )
         })
@@ -75,7 +75,7 @@ impl Engine {
     }
 
     /// Gradient of the potential in the present state [N]: points, pinned ones included, then sliding
-    /// coordinates.
+    /// coordinates. What nodes of blended rings bear as a whole is on the vertices.
     pub fn forces(&mut self, state: &State) -> Result<Vec<Vec3>> {
         self.with_present(state, |engine, at| {
             let mut gradient = vec![Vec3::zeros(); at.x.len()];
@@ -86,6 +86,7 @@ impl Engine {
                 &engine.workers,
                 &mut gradient,
             );
+            engine.system.points.coupling.gather(&mut gradient);
             gradient
         })
     }

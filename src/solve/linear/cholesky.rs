@@ -29,7 +29,7 @@ use faer::sparse::linalg::cholesky::{
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRef};
 use faer::traits::RealField;
-use faer::{Par, Side};
+use faer::{Conj, Mat, Par, Side};
 use std::ops::{Add, AddAssign, Div, Mul, Sub, SubAssign};
 
 /// A precision to factor in.
@@ -254,6 +254,32 @@ impl<T: Number> Cholesky<T> {
             }
         }
         Ok(())
+    }
+
+    /// Solves with the factor for sparse right-hand sides of `(scalar row, value)`, in columns; on this thread.
+    pub(super) fn solve_columns(&self, right: &[Vec<(u32, f64)>]) -> Mat<f64>
+    where
+        T: RealField,
+    {
+        let n = 3 * self.place.len();
+        let mut permuted = Mat::<T>::zeros(n, right.len());
+        let place = |i: usize| 3 * self.place[i / 3] + i % 3;
+        for (k, column) in right.iter().enumerate() {
+            for (i, value) in column {
+                permuted[(place(*i as usize), k)] = T::of(*value);
+            }
+        }
+        if let SymbolicCholeskyRaw::Supernodal(symbolic) = self.symbolic.raw() {
+            let need = symbolic.solve_in_place_scratch::<T>(right.len(), Par::Seq);
+            let mut memory = MemBuffer::new(need);
+            supernodal::SupernodalLltRef::new(symbolic, &self.factor).solve_in_place_with_conj(
+                Conj::No,
+                permuted.as_mut(),
+                Par::Seq,
+                MemStack::new(&mut memory),
+            );
+        }
+        Mat::from_fn(n, right.len(), |i, k| permuted[(place(i), k)].into())
     }
 
     /// Stored numbers of the factor, padding of supernodes included.

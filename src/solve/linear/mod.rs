@@ -4,10 +4,12 @@
 //! * [`pcg`]: conjugate gradients with a [`pcg::Preconditioner`]: [`jacobi`] (3x3 diagonal blocks),
 //!   [`ic0`] (incomplete Cholesky on the pattern of `A`, in an [`ordering`]) or [`factored`] (the
 //!   complete factor of an earlier matrix), the latter two made from the [`stiff_part`].
+//! * [`constrained`]: the same with linear constraints between the unknowns, of blended rings.
 //! * [`choose`]: which of them, by number or by measured crossover.
 
 mod cholesky;
 pub mod choose;
+pub mod constrained;
 pub mod direct;
 pub mod factored;
 pub mod ic0;
@@ -33,6 +35,10 @@ pub enum LinearError {
 pub trait LinearSolver: Send {
     /// Stable name, as in reports and as users force it.
     fn name(&self) -> &'static str;
+    /// Blocks whose rows the next matrices have as those of the identity: the values there stay.
+    fn hold(&mut self, fixed: &[bool]) {
+        let _ = fixed;
+    }
     /// Takes a new matrix. Reuses the symbolic analysis while the pattern stays the same.
     fn prepare(&mut self, matrix: &BlockMatrix) -> Result<(), LinearError>;
     /// Whether `solve` may be called with this matrix although an earlier one was prepared.

@@ -31,7 +31,8 @@ impl EdgeContact {
     pub fn new(cloth: &Cloth) -> Self {
         let edges = topology::edges(&cloth.mesh.triangles);
         let mut areas = vec![0.0; edges.len()];
-        for (tri, area) in cloth.mesh.triangles.iter().zip(&cloth.areas) {
+        let own = cloth.areas.iter().zip(&cloth.own).map(|(a, own)| a * own);
+        for (tri, area) in cloth.mesh.triangles.iter().zip(own) {
             for k in 0..3 {
                 let (a, b) = (tri[k], tri[(k + 1) % 3]);
                 if let Ok(e) = edges.binary_search(&[a.min(b), a.max(b)]) {

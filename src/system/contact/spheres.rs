@@ -32,7 +32,7 @@
 //! # Yarns
 //!
 //! A node's sphere has the radius of the yarn. Segments are ways like edges, and so is the way from a node that rides
-//! on a triangle to the triangle's vertices; a node and another point of its panel are
+//! on a triangle or is blended into it to the triangle's vertices; a node and another point of its panel are
 //! neighbours if the straight line between them is short, since yarns of one layer touch. Nodes that have become neighbours
 //! because yarns have slid are so too ([`rods`](super::rods)).
 
@@ -117,7 +117,9 @@ impl Spheres {
             rods: yarns.map_or_else(Rods::default, |y| Rods::new(y, points.vertex_count as u32)),
         };
         let mut ways = ways(cloth, &edges, yarns);
-        for rider in points.riders.list() {
+        let coupling = &points.coupling;
+        let blended = coupling.filter.iter().flat_map(|f| f.nodes());
+        for rider in coupling.riders.list().iter().chain(blended) {
             let place = |v: u32| uv[v as usize];
             let carried = rider.vertices.iter().zip(&rider.weights);
             let own: Vec2 = carried.map(|(v, w)| place(*v) * *w).sum();

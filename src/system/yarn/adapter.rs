@@ -4,13 +4,15 @@
 //! A stencil's blocks are those of its nodes and then those of its sliding coordinates, each once; two
 //! coordinates may lie in one block. Stencils are grouped by their number of blocks, a term for
 //! each; a stencil of coordinates alone that do not slide has no unknowns and is left out, its
-//! energy a constant.
+//! energy a constant. Where triangles have a part in the cloth an energy has the weight of its nodes' `alpha`
+//! ([`YarnMesh::weight`]).
 
 use super::super::state::State;
 use super::super::term::{Configuration, HessianKind, Stencils, Term};
 use super::kernel::{Kernel, Local, MAX_POSITIONS, MAX_SLIDES};
 use super::unknowns::Unknowns;
 use crate::math::{Mat3, Vec3};
+use crate::yarn::YarnMesh;
 
 /// Place of a scalar that is no unknown.
 const FROZEN: u8 = u8::MAX;
@@ -27,6 +29,8 @@ pub(super) struct Stencil<K> {
 
 struct Element<K, const N: usize> {
     kernel: K,
+    /// Part of the energy that is the yarns'.
+    weight: f64,
     incidences: [u32; MAX_SLIDES],
     /// Three times the block plus the component of each scalar among the stencil's blocks.
     place: [u8; N],
@@ -42,6 +46,7 @@ pub struct YarnTerm<K, const N: usize> {
 /// Terms of all stencils, one for each number of blocks that occurs.
 pub(super) fn terms<K: Kernel<N> + 'static, const N: usize>(
     unknowns: &Unknowns,
+    mesh: &YarnMesh,
     stencils: impl IntoIterator<Item = Stencil<K>>,
 ) -> Vec<Box<dyn Term>> {
     let mut groups: Vec<YarnTerm<K, N>> = (0..=MAX_POSITIONS + MAX_SLIDES)
@@ -75,10 +80,17 @@ pub(super) fn terms<K: Kernel<N> + 'static, const N: usize>(
                 place[k] = 3 * local(block) + component;
             }
         }
+        let weight = if K::POSITIONS > 0 {
+            mesh.weight(&stencil.nodes[..K::POSITIONS])
+        } else {
+            let nodes = stencil.incidences.map(|i| mesh.incidences[i as usize].node);
+            mesh.weight(&nodes[..N])
+        };
         let group = &mut groups[arity];
         group.blocks.extend_from_slice(&blocks[..arity]);
         group.elements.push(Element {
             kernel: stencil.kernel,
+            weight,
             incidences: stencil.incidences,
             place,
         });
@@ -144,16 +156,17 @@ impl<K: Kernel<N>, const N: usize> Term for YarnTerm<K, N> {
     }
 
     fn value(&self, e: usize, at: &Configuration<'_>) -> f64 {
-        self.with(e, at, |kernel, local| kernel.value(local))
+        self.with(e, at, |kernel, local| kernel.value(local)) * self.elements[e].weight
     }
 
     fn gradient(&self, e: usize, at: &Configuration<'_>, out: &mut [Vec3]) {
         let mut g = [0.0; N];
         self.with(e, at, |kernel, local| kernel.gradient(local, &mut g));
         out.fill(Vec3::zeros());
-        for (place, g) in self.elements[e].place.iter().zip(g) {
+        let Element { weight, place, .. } = &self.elements[e];
+        for (place, g) in place.iter().zip(g) {
             if *place != FROZEN {
-                out[usize::from(place / 3)][usize::from(place % 3)] += g;
+                out[usize::from(place / 3)][usize::from(place % 3)] += g * weight;
             }
         }
     }
@@ -163,7 +176,12 @@ impl<K: Kernel<N>, const N: usize> Term for YarnTerm<K, N> {
         self.with(e, at, |kernel, local| {
             kernel.hessian(local, kind.exactness(), &mut h);
         });
-        let place = &self.elements[e].place;
+        let Element { weight, place, .. } = &self.elements[e];
+        for row in &mut h {
+            for entry in row {
+                *entry *= weight;
+            }
+        }
         out.fill(Mat3::zeros());
         for p in 0..K::POSITIONS {
             for r in 0..=p {

@@ -127,9 +127,9 @@ impl Contacts {
         if !releases {
             return Ok(None);
         }
-        // what triangles carry does not come off either
+        // where triangles have a part nothing comes off
         for (node, held) in (0..).zip(&mut self.held) {
-            *held |= !mesh.is_inside(node);
+            *held |= !mesh.is_whole(node);
         }
         release(&self.laid, &self.yarns, &self.passings, &self.held, state)
     }
@@ -138,7 +138,7 @@ impl Contacts {
     fn is_jammed(&self, i: usize, releases: bool, state: &State) -> bool {
         let passages = [i, i + 1].map(|i| &self.yarns.mesh.incidences[i]);
         let mesh = &self.yarns.mesh;
-        let stays = |node: u32| self.held[node as usize] || !mesh.is_inside(node);
+        let stays = |node: u32| self.held[node as usize] || !mesh.is_whole(node);
         let held = passages.iter().any(|p| stays(p.node));
         let passing = self.passings[i];
         if held || passing == Passing::Kept {

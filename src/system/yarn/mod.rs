@@ -80,31 +80,44 @@ pub fn terms(
     unknowns: &Unknowns,
     options: &YarnOptions,
 ) -> Result<Vec<Box<dyn Term>>> {
-    let mut all = adapter::terms(unknowns, springs::weights(mesh, materials)?);
+    let mut all = adapter::terms(unknowns, mesh, springs::weights(mesh, materials)?);
     all.extend(adapter::terms(
         unknowns,
+        mesh,
         springs::stretches(mesh, materials)?,
     ));
-    all.extend(adapter::terms(unknowns, springs::bends(mesh, materials)?));
     all.extend(adapter::terms(
         unknowns,
+        mesh,
+        springs::bends(mesh, materials)?,
+    ));
+    all.extend(adapter::terms(
+        unknowns,
+        mesh,
         springs::wraps(mesh, materials, options)?,
     ));
     all.extend(adapter::terms(
         unknowns,
+        mesh,
         springs::stitches(mesh, materials)?,
     ));
-    all.extend(adapter::terms(unknowns, springs::corners(mesh, materials)?));
     all.extend(adapter::terms(
         unknowns,
+        mesh,
+        springs::corners(mesh, materials)?,
+    ));
+    all.extend(adapter::terms(
+        unknowns,
+        mesh,
         springs::spacings(mesh, materials)?,
     ));
-    all.extend(adapter::terms(unknowns, springs::ties(mesh, options)));
+    all.extend(adapter::terms(unknowns, mesh, springs::ties(mesh, options)));
     let [own, beside] = springs::rubbings(mesh, materials)?;
-    all.extend(adapter::terms::<_, 1>(unknowns, own));
-    all.extend(adapter::terms::<_, 2>(unknowns, beside));
+    all.extend(adapter::terms::<_, 1>(unknowns, mesh, own));
+    all.extend(adapter::terms::<_, 2>(unknowns, mesh, beside));
     all.extend(adapter::terms(
         unknowns,
+        mesh,
         springs::inertias(mesh, materials, options)?,
     ));
     Ok(all)

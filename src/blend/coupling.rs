@@ -1,0 +1,50 @@
+//! What yarns and triangles of one system have to do with each other, whichever way they were joined.
+
+use super::filter::Filter;
+use super::riders::Riders;
+use crate::math::Vec3;
+use crate::yarn::YarnMesh;
+use std::sync::Arc;
+
+/// Points whose places follow from others, and constraints between points.
+#[derive(Clone, Debug, Default)]
+pub struct Coupling {
+    /// Nodes that ride on triangles.
+    pub riders: Riders,
+    /// The constraints of blended rings, if there are any.
+    pub filter: Option<Arc<Filter>>,
+}
+
+/// Yarns of a region and how they are joined to the triangles around it.
+#[derive(Clone, Debug, Default)]
+pub struct Joined {
+    /// The yarns.
+    pub yarns: YarnMesh,
+    /// What joins them, by points (vertices, then nodes).
+    pub coupling: Coupling,
+    /// Part of the membrane of each triangle of the whole mesh that is its own, along weft and warp.
+    pub share: Vec<[f64; 2]>,
+    /// Part of its other energies.
+    pub own: Vec<f64>,
+    /// Mass of each triangle that yarns cover in part [kg], by triangle of the whole mesh.
+    pub masses: Vec<Option<f64>>,
+}
+
+impl Coupling {
+    /// Brings values of points to those that the coupling admits: nodes of rings keep what the triangles cannot
+    /// say, riders take what their vertices make.
+    pub fn carry(&self, values: &mut [Vec3]) {
+        if let Some(filter) = &self.filter {
+            filter.project(values);
+        }
+        self.riders.carry(values);
+    }
+
+    /// Turns a gradient by points that move independently into one by vertices, with what hangs on them, and by what
+    /// nodes do beside that.
+    pub fn gather(&self, gradient: &mut [Vec3]) {
+        if let Some(filter) = &self.filter {
+            filter.gather(gradient);
+        }
+    }
+}
