@@ -173,6 +173,6 @@ fn settings_that_are_counts_take_whole_numbers_only() {
         assert_eq!(sim.number(key.name).unwrap(), before);
     }
     let counts = Settings::KEYS.iter().filter(|k| k.whole).count();
-    assert_eq!(counts, 10);
+    assert_eq!(counts, 12);
     sim.set_number("solver.step.min", 1.5e-7).unwrap();
 }
