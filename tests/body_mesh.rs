@@ -556,7 +556,9 @@ fn distances_agree_with_every_triangle_looked_at() {
         p.push(p[b as usize]);
         t.push([a, b, double]);
         t.push([b, a, double]);
-        let Ok(body) = Body::mesh(&p, &t, 0.03) else {
+        // given cells must not be coarser than the body is thin
+        let cell = if squeeze < 1.0 { 0.0 } else { 0.03 };
+        let Ok(body) = Body::mesh(&p, &t, cell) else {
             assert!(squeeze < 1e-8, "{n} {m}");
             continue;
         };
@@ -748,4 +750,19 @@ fn a_damaged_real_body_is_mended_or_refused_with_its_place() {
         pair.contains("1 parts are turned outward and 1 inward") && pair.contains("26756"),
         "{pair}"
     );
+}
+
+#[test]
+fn cells_too_coarse_for_a_body_are_refused() {
+    let (p, t) = cube(0.5);
+    for cell in [0.3, 2.0, 1e300] {
+        let error = Body::mesh(&p, &t, cell).unwrap_err();
+        assert_eq!(error.status, toile::error::Status::Geometry);
+        assert!(error.message.contains("1 m thin"), "{error}");
+    }
+    let body = Body::mesh(&p, &t, 0.25).unwrap();
+    for depth in [0.01, 0.05, 0.2, 0.5] {
+        let d = body.distance(&Vec3::new(0.5 - depth, 0.1, 0.05)).value;
+        assert!(d < 0.0, "{depth}: {d}");
+    }
 }

@@ -411,3 +411,16 @@ fn stiffness_from_1_to_100_000_newtons_per_metre_drapes_and_moves() {
         assert!(moved < 1e-3, "{stiffness} N/m: moved {moved} m at rest");
     }
 }
+
+#[test]
+fn a_step_that_cannot_be_taken_names_the_place() {
+    let settings = Settings {
+        min_step: 1e-3,
+        ..quiet()
+    };
+    let mut sim = sheet([0.4, 0.4], [8, 8], Fabric::default(), settings);
+    sim.pin(&[0], Some(&[[1e3, 0.0, 0.0]])).unwrap();
+    let error = sim.step(0.01).unwrap_err();
+    assert!(error.message.contains("an edge at vertex "), "{error}");
+    assert!(error.message.contains("at most 20 %"), "{error}");
+}

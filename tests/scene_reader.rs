@@ -436,3 +436,46 @@ fn ten_thousand_broken_scenes_give_a_text_and_no_panic() {
     println!("{refused} refused, {read} still scenes");
     assert!(refused > 5_000 && read > 100, "{refused} {read}");
 }
+
+#[test]
+fn the_last_step_takes_what_is_left_of_a_duration() {
+    let plan = |duration, dt| toile::scene::RunPlan {
+        duration,
+        dt,
+        ..toile::scene::RunPlan::default()
+    };
+    for (duration, dt, steps) in [
+        (0.05, 1.0, 1),
+        (0.05, 0.03, 2),
+        (0.3, 0.01, 30),
+        (1.0, 1.0 / 60.0, 60),
+        (0.0, 0.01, 0),
+        (0.7, 0.1, 7),
+    ] {
+        let plan = plan(duration, dt);
+        assert_eq!(plan.steps(), steps, "{duration} {dt}");
+        assert!((plan.time_after(steps) - duration).abs() <= 1e-15 * steps as f64);
+        for k in 1..steps {
+            assert_eq!(plan.time_after(k), k as f64 * dt);
+        }
+    }
+}
+
+#[test]
+fn a_pin_far_beside_its_panel_is_refused() {
+    let scene = |uv: Value| {
+        json!({"toile": 1, "garment": square(), "edge_length": 0.3,
+            "pins": [{"panel": 0, "uv": uv}]})
+    };
+    let read = |uv: Value| Scene::read_all(&scene(uv).to_string(), None).1;
+    assert!(read(json!([-0.1, 1.2])).is_empty());
+    for uv in [json!([50, 50]), json!([0.5, -2.0])] {
+        let problems = read(uv);
+        assert_eq!(problems.len(), 1, "{problems:#?}");
+        let text = &problems[0].message;
+        assert!(
+            text.contains("pins[0].uv") && text.contains("'square'"),
+            "{text}"
+        );
+    }
+}

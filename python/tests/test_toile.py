@@ -1,7 +1,10 @@
 """The package against the library: small garments, real calls."""
 
+import copy
+import ctypes
 import json
 import os
+import pickle
 import subprocess
 import sys
 import threading
@@ -298,3 +301,19 @@ def test_a_half_pulled_weft_goes_on_bit_by_bit_in_another_process(tmp_path):
     program = Path(__file__).with_name("weave.py")
     subprocess.run([sys.executable, program, half, "20"], check=True)
     assert half.read_bytes() == whole
+
+
+def test_handles_are_not_copied_and_numbers_do_not_wrap():
+    with toile.Sim(square(0.1)) as sim:
+        body = toile.Body.sphere(0.1)
+        sim.add_body(body)
+        for thing in (sim, body, sim.garment):
+            for way in (copy.copy, copy.deepcopy, pickle.dumps):
+                with pytest.raises(TypeError, match="neither pickled nor copied"):
+                    way(thing)
+        for wrong in (2**32, -1):
+            with pytest.raises(ctypes.ArgumentError, match="2\\^32"):
+                sim.set_body_pose(wrong, (0, -5, 0))
+        assert sim.time == 0
+    with pytest.raises(ValueError, match="threads: -1"):
+        toile.Sim(square(0.1), threads=-1)

@@ -7,6 +7,7 @@ both with ``include/toile.h``.
 from __future__ import annotations
 
 import ctypes
+import operator
 import os
 import sys
 from ctypes import POINTER, c_char, c_char_p, c_double, c_int32, c_size_t, c_uint8, c_uint32
@@ -135,9 +136,34 @@ STRUCTS: dict[str, list[tuple[str, Any]]] = {
 }
 
 
+class _Index(c_uint32):
+    """An argument of 32 bits; ctypes alone would take any integer modulo 2^32."""
+
+    @classmethod
+    def from_param(cls, value: Any) -> Any:
+        return c_uint32(_whole(value))
+
+
+def _whole(value: Any) -> int:
+    number = operator.index(value)
+    if not 0 <= number < 2**32:
+        raise ValueError(f"{number} must be from 0 to 2^32 - 1")
+    return number
+
+
+class _Struct(ctypes.Structure):
+    def __setattr__(self, name: str, value: Any) -> None:
+        if dict(type(self)._fields_).get(name) is c_uint32:
+            try:
+                value = _whole(value)
+            except ValueError as e:
+                raise ValueError(f"{name}: {e}") from None
+        super().__setattr__(name, value)
+
+
 def _struct(name: str) -> Any:
     fields = [("struct_size", c_size_t), *STRUCTS[name]]
-    return type(name, (ctypes.Structure,), {"_fields_": fields})
+    return type(name, (_Struct,), {"_fields_": fields})
 
 
 types: dict[str, Any] = {name: _struct(name) for name in STRUCTS}
@@ -278,7 +304,7 @@ def load() -> ctypes.CDLL:
     for name, (result, arguments) in FUNCTIONS.items():
         function = getattr(library, name)
         function.restype = result
-        function.argtypes = arguments
+        function.argtypes = [_Index if a is c_uint32 else a for a in arguments]
     return library
 
 

@@ -28,6 +28,10 @@ class _Owner:
             raise ValueError(f"this {type(self).__name__} is closed")
         return ctypes.c_void_p(self._handle)
 
+    def __reduce_ex__(self, protocol: Any) -> Any:
+        # a handle means nothing in another process, and a copy would free it a second time
+        raise TypeError(f"a {type(self).__name__} can be neither pickled nor copied")
+
     def close(self) -> None:
         """Frees the object in the library; closing twice does nothing."""
         if self._handle is not None:

@@ -9,11 +9,15 @@ use super::field::{Field, Origin, Source};
 use super::mesh::{MeshReport, Topology, finite_positions};
 use super::tree::Tree;
 use super::{analytic, sign};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::math::Vec3;
+use crate::math::boxtree::Aabb;
 use crate::math::hash::Hash;
 use crate::math::parallel::Workers;
 use std::sync::Arc;
+
+/// Largest cell size given over the least extent of the body.
+const COARSEST: f64 = 0.25;
 
 /// What all deformations of a mesh share.
 #[derive(Debug)]
@@ -40,6 +44,18 @@ fn automatic_cell(report: &MeshReport) -> f64 {
     (0.5 * report.median_edge).clamp(0.7 * typical, 1.4 * typical)
 }
 
+/// Refuses a cell size at which the field would lose the inside of the body.
+fn fine_enough(vertices: &[Vec3], cell: f64) -> Result<()> {
+    let bounds = Aabb::of(vertices);
+    let least = (bounds.max - bounds.min).min();
+    if cell > COARSEST * least {
+        return Err(Error::geometry(format!(
+            "cell size {cell} m: the body is {least} m thin, and cells are at most {COARSEST} of that; 0 chooses"
+        )));
+    }
+    Ok(())
+}
+
 impl MeshBody {
     /// Takes all that makes the body into a hash.
     pub(super) fn add_to(&self, hash: &mut Hash) {
@@ -64,6 +80,7 @@ impl MeshBody {
             analytic::positive("cell size", cell)?;
         }
         let topology = Topology::new(&vertices, triangles)?;
+        fine_enough(&vertices, cell)?;
         let h = if cell == 0.0 {
             automatic_cell(&topology.report)
         } else {

@@ -109,7 +109,8 @@ pub unsafe extern "C" fn toile_body_grid(
 
 /// A body from a closed triangle mesh: positions [m], shape [vertex_count, 3]; triangles, shape
 /// [triangle_count, 3], counter-clockwise seen from outside. The field is sampled every `cell_size`
-/// [m] near the surface; 0 chooses. TOILE_E_GEOMETRY names what is wrong with the mesh.
+/// [m] near the surface, at most a quarter of the body's least extent; 0 chooses. TOILE_E_GEOMETRY names what is
+/// wrong with the mesh.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn toile_body_mesh(
     positions: *const f64,

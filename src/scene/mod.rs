@@ -155,9 +155,22 @@ impl Default for RunPlan {
 pub const MAX_STEPS: f64 = 1e8;
 
 impl RunPlan {
-    /// Number of steps: the duration in steps of `dt`, the last one not shorter than half a step.
+    /// Number of steps: the duration in steps of `dt`, the last one of what is left.
     pub fn steps(&self) -> u64 {
-        (self.duration / self.dt).round().clamp(0.0, MAX_STEPS) as u64
+        let steps = self.duration / self.dt;
+        // a remainder of rounding is no step
+        (steps - 1e-9 * steps.max(1.0)).ceil().clamp(0.0, MAX_STEPS) as u64
+    }
+
+    /// Time gone after a number of steps [s].
+    pub fn time_after(&self, step: u64) -> f64 {
+        let time = step as f64 * self.dt;
+        let last = self.duration - (self.steps() as f64 - 1.0) * self.dt;
+        if step == self.steps() && (last - self.dt).abs() > 1e-6 * self.dt {
+            self.duration
+        } else {
+            time
+        }
     }
 
     /// Refuses steps that are not positive and plans without end.

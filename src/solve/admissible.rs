@@ -11,6 +11,8 @@ use crate::system::yarn::stretch::Stretch;
 
 /// Vertices of one parallel task.
 const CHUNK: usize = 256;
+/// Largest change of an edge's length in a substep, over its rest length.
+const MOST_CHANGE: f64 = 0.2;
 
 /// Why a converged substep may still not stand.
 pub(super) fn inadmissible(
@@ -18,7 +20,7 @@ pub(super) fn inadmissible(
     at: &Configuration<'_>,
     dynamic: bool,
     workers: &Workers,
-) -> Option<&'static str> {
+) -> Option<String> {
     let count = system.points.count();
     let (start, x) = (&at.x0[..count], &at.x[..count]);
     let mut reasons = vec![None; x.len().div_ceil(CHUNK)];
@@ -27,22 +29,40 @@ pub(super) fn inadmissible(
             let vertices = c * CHUNK..((c + 1) * CHUNK).min(x.len());
             reason[0] = vertices
                 .into_iter()
-                .find_map(|v| misplaced(system, b, &start[v], &x[v]));
+                .find_map(|v| misplaced(system, b, &start[v], &x[v]).map(|what| (v, what)));
         });
-        if let Some(reason) = reasons.iter().flatten().next() {
-            return Some(reason);
+        if let Some((v, what)) = reasons.iter().flatten().next() {
+            return Some(format!("{} {what} {b}", named(system, *v)));
         }
     }
     if let Some(term) = system.terms.iter().find(|term| term.max_step(at) < 1.0) {
-        return Some(match term.name() {
+        let reason = match term.name() {
             Stretch::NAME => "a yarn would slide out between two contacts",
             _ => "cloth would pass through itself",
-        });
+        };
+        return Some(reason.to_owned());
     }
-    if dynamic && system.largest_stretch_change(start, x) > 0.2 {
-        return Some("an edge changed its length too much");
+    if dynamic
+        && let Some((vertex, change)) = system.largest_stretch_change(start, x)
+        && change > MOST_CHANGE
+    {
+        return Some(format!(
+            "an edge at {} changed its length by {:.0} % (at most {:.0} % in a substep)",
+            named(system, vertex as usize),
+            1e2 * change,
+            1e2 * MOST_CHANGE
+        ));
     }
     None
+}
+
+/// A point as hosts count it.
+pub(super) fn named(system: &System, point: usize) -> String {
+    let panel = system.panel_of(point as u32);
+    match point.checked_sub(system.points.vertex_count) {
+        Some(node) => format!("yarn node {node} of panel {panel}"),
+        None => format!("vertex {point} of panel {panel}"),
+    }
 }
 
 /// What is wrong with the way of a vertex from `x0` to `x` past a body.
@@ -55,10 +75,10 @@ fn misplaced(system: &System, body: usize, x0: &Vec3, x: &Vec3) -> Option<&'stat
         return None;
     }
     if room > 0.0 && bodies.value(body, x) < -limit {
-        return Some("a vertex went too deep into a body");
+        return Some("went too deep into body");
     }
     if bodies.passes_through(body, x0, x, limit) {
-        return Some("a vertex passed through a body");
+        return Some("passed through body");
     }
     None
 }

@@ -49,12 +49,12 @@ pub struct Engine {
 }
 
 /// What one attempt at a substep came to.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Attempt {
     /// The state was advanced.
     Accepted(Summary),
     /// The state is as before; a smaller substep may do.
-    Rejected(&'static str, Summary),
+    Rejected(String, Summary),
 }
 
 /// How a substep moves.
@@ -345,9 +345,9 @@ impl Engine {
         )?;
         summary.iterations += tried;
         let refused = if dynamic && !summary.converged {
-            Some("Newton's method did not converge")
+            Some("Newton's method did not converge".to_owned())
         } else if !dynamic && summary.last_length == 0.0 && !summary.converged {
-            Some("the line search found no decrease")
+            Some("the line search found no decrease".to_owned())
         } else {
             let at = Configuration {
                 x: &x,

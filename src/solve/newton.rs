@@ -160,6 +160,17 @@ impl Problem<'_> {
         inertia + energy(self.terms, &self.at(x), self.workers)
     }
 
+    /// Names an energy that is not finite.
+    fn unbounded(&self, x: &[Vec3]) -> String {
+        let at = self.at(x);
+        let mut terms = self.terms.iter().filter(|term| !term.is_idle(&at));
+        let found = terms.find(|term| {
+            let mut values = (0..term.stencils().count()).map(|e| term.value(e, &at));
+            values.any(|value| !value.is_finite())
+        });
+        format!("the energy of {}", found.map_or("motion", |t| t.name()))
+    }
+
     /// Force on what moves, as large as it is anywhere [N].
     fn size(&self, gradient: &[Vec3], gathered: &mut [Vec3]) -> f64 {
         if self.coupling.filter.is_none() {
@@ -305,7 +316,7 @@ impl Problem<'_> {
         let mut summary = Summary::default();
         let mut value = self.value(x);
         if !value.is_finite() {
-            return Err(not_finite("energy"));
+            return Err(not_finite(&self.unbounded(x)));
         }
         let mut exactness = tolerance.exactness;
         let mut doubts = 0;

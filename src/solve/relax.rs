@@ -102,7 +102,7 @@ pub fn relax(
         let motion = Motion::Relax { exact, follow };
         let (summary, reason) = match engine.attempt(state, h, part, motion) {
             Ok(Attempt::Accepted(summary)) => (summary, None),
-            Ok(Attempt::Rejected(reason, summary)) => (summary, Some(reason.to_owned())),
+            Ok(Attempt::Rejected(reason, summary)) => (summary, Some(reason)),
             Err(e) if matches!(e.status, Status::NoAdmissibleState | Status::LinearSolve) => {
                 (super::newton::Summary::default(), Some(e.message))
             }

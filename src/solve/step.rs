@@ -70,7 +70,7 @@ fn advance(
             }
             Ok(Attempt::Rejected(reason, summary)) => {
                 add(&mut totals, &summary);
-                reason.to_owned()
+                reason
             }
             Err(error)
                 if matches!(

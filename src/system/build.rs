@@ -320,16 +320,14 @@ impl System {
         self.rest_lengths.iter().sum::<f64>() / self.rest_lengths.len().max(1) as f64
     }
 
-    /// Largest change of an edge's relative length between two configurations.
-    pub fn largest_stretch_change(&self, start: &[Vec3], x: &[Vec3]) -> f64 {
-        self.edges
-            .iter()
-            .zip(&self.rest_lengths)
-            .map(|(e, rest)| {
-                let [a, b] = e.map(|v| v as usize);
-                ((x[b] - x[a]).norm() - (start[b] - start[a]).norm()).abs() / rest
-            })
-            .fold(0.0, f64::max)
+    /// Largest change of an edge's relative length between two configurations, with a vertex of that edge.
+    pub fn largest_stretch_change(&self, start: &[Vec3], x: &[Vec3]) -> Option<(u32, f64)> {
+        let changes = self.edges.iter().zip(&self.rest_lengths).map(|(e, rest)| {
+            let [a, b] = e.map(|v| v as usize);
+            let change = (x[b] - x[a]).norm() - (start[b] - start[a]).norm();
+            (e[0], change.abs() / rest)
+        });
+        changes.reduce(|a, b| if b.1 > a.1 { b } else { a })
     }
 
     /// Root mean square of the edges' relative change of length.

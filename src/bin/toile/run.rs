@@ -92,9 +92,16 @@ pub(crate) fn run(args: &RunArgs) -> Done {
     let origin = sim.time();
     bar.set_message("step");
     for step in 1..=steps {
-        driver.set(&mut sim, &scene, origin + step as f64 * scene.run.dt)?;
+        let time = scene.run.time_after(step);
+        driver.set(&mut sim, &scene, origin + time)?;
+        let whole = step < steps || time == step as f64 * scene.run.dt;
+        let dt = if whole {
+            scene.run.dt
+        } else {
+            time - scene.run.time_after(step - 1)
+        };
         let report = sim
-            .step(scene.run.dt)
+            .step(dt)
             .map_err(|e| e.at(format!("step {step} of {steps}")))?;
         summary.take(&report);
         summary.steps += 1;
@@ -215,8 +222,15 @@ fn write(
     }
     let glb = gltf::to_glb(&parts, &motions)?;
     file(&dir.join("scene.glb"), &glb)?;
+    let motion = dir.join("garment.pc2");
     if !frames.times.is_empty() {
-        file(&dir.join("garment.pc2"), &pc2::to_pc2(&frames.garment)?)?;
+        file(&motion, &pc2::to_pc2(&frames.garment)?)?;
+    } else if motion.is_file() {
+        // that of an earlier run does not go with these files
+        std::fs::remove_file(&motion).map_err(|e| Failure {
+            code: 4,
+            text: format!("cannot remove {}: {e}", motion.display()),
+        })?;
     }
     let up = -Vec3::from(scene.gravity);
     let options = PictureOptions {

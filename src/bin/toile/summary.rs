@@ -49,7 +49,6 @@ impl Summary {
         self.peak_memory = peak_memory();
     }
 
-    /// Every key of `summary.json`; a number that is not finite becomes null.
     /// What a garment that is dressed as it should be does not have.
     fn doubts(&self, last: &StepReport) -> Vec<String> {
         let mut doubts = Vec::new();
@@ -71,6 +70,7 @@ impl Summary {
         doubts
     }
 
+    /// Every key of `summary.json`; a number that is not finite becomes null.
     pub(crate) fn to_json(&self, sim: &Sim, last: &StepReport) -> Value {
         let info = sim.info();
         let mut map = Map::new();

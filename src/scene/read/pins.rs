@@ -2,8 +2,9 @@
 
 use super::offset_keys;
 use crate::error::Result;
-use crate::pattern::Garment;
+use crate::math::Vec2;
 use crate::pattern::import::read::{Node, Object};
+use crate::pattern::{Garment, Panel};
 use crate::scene::{PinPlace, ScenePin, SceneProbe, schema};
 
 /// Reads panel and place, looked up where the garment is known.
@@ -26,7 +27,13 @@ fn place(object: &Object<'_>, garment: Option<&Garment>) -> Result<(u32, PinPlac
         Some((count, None)) => return Err(panel_node.error(format!("panel {panel} of {count}"))),
     };
     let place = match (object.get("uv"), object.get("edge")) {
-        (Some(uv), None) => PinPlace::Point(uv.vec2()?.into()),
+        (Some(uv), None) => {
+            let point = uv.vec2()?;
+            if let Some(panel) = garment.and_then(|g| g.panels.get(panel as usize)) {
+                near(&uv, &point, panel)?;
+            }
+            PinPlace::Point(point.into())
+        }
         (None, Some(edge)) => {
             let index = edge.index()?;
             if let Some(count) = edges
@@ -39,6 +46,30 @@ fn place(object: &Object<'_>, garment: Option<&Garment>) -> Result<(u32, PinPlac
         _ => return Err(object.error("give either uv or edge")),
     };
     Ok((panel, place))
+}
+
+/// Refuses a place farther beside a panel than the panel is large: given in another unit, or of another panel.
+fn near(node: &Node<'_>, point: &Vec2, panel: &Panel) -> Result<()> {
+    let mut corners = panel.vertices.iter();
+    let Some(first) = corners.next() else {
+        return Ok(());
+    };
+    let (least, most) = corners.fold((*first, *first), |(a, b), p| (a.inf(p), b.sup(p)));
+    let outside = (least - point).sup(&(point - most)).sup(&Vec2::zeros());
+    if outside.norm() > (most - least).norm() {
+        return Err(node.error(format!(
+            "({}, {}) lies {:.3} m beside panel '{}', whose corners are from ({}, {}) to ({}, {})",
+            point.x,
+            point.y,
+            outside.norm(),
+            panel.name,
+            least.x,
+            least.y,
+            most.x,
+            most.y
+        )));
+    }
+    Ok(())
 }
 
 /// Reads a probe; `before` are those that came earlier.
