@@ -105,7 +105,7 @@ impl Key {
 
 settings! {
     /// Newton iterations allowed in one substep before it is cut.
-    newton_max_iterations: "solver.newton.max_iterations" = 30.0, 1.0, 10_000.0, "1" whole;
+    newton_max_iterations: "solver.newton.max_iterations" = 60.0, 1.0, 10_000.0, "1" whole;
     /// A substep has converged when the largest Newton correction, over the substep size, is below this speed.
     newton_velocity_tolerance: "solver.newton.velocity_tolerance" = 1e-3, 1e-12, 1e3, "m/s";
     /// A substep has also converged when the last Newton iteration has lowered the incremental potential by no more than this part of what all of them have. 0 asks for the velocity tolerance alone.
