@@ -233,6 +233,8 @@ def test_yarns_of_a_panel_are_read_and_held():
         held = nodes[[0, -1]]
         target = x[held] + [0, 0, 1e-4]
         sim.pin_yarn_nodes(held, target)
+        # what begins to slip at the end of a step slides in the next
+        sim.step(1e-3)
         sim.step(1e-3)
         np.testing.assert_array_equal(sim.yarn_nodes[held], target)
         assert sim.yarn_tensions.shape == sim.yarn_slips.shape == nodes.shape
