@@ -1,9 +1,10 @@
 //! Cases that break simulators: large and small steps, slivers, a fast ball, a packet of folds,
 //! overstretched pins, coincident panels, extreme stiffness, bad input.
 
+use std::f64::consts::{FRAC_PI_2, PI};
 use toile::body::Body;
-use toile::math::{Vec2, Vec3};
-use toile::pattern::{Fabric, Garment, Placement};
+use toile::math::{Rotation, Vec2, Vec3};
+use toile::pattern::{Fabric, Garment, Panel, Placement};
 use toile::sim::{ContactSettings, DrapeOptions, Outcome, Settings, Sim, SimOptions};
 use toile::system::contact::crossing::crossings;
 use toile::tri::GarmentMesh;
@@ -321,22 +322,58 @@ fn pins_pulled_three_times_apart_stretch_the_sheet_and_let_it_come_back() {
     assert!(report.max_edge_strain < 0.02, "{}", report.max_edge_strain);
 }
 
-#[test]
-fn coincident_panels_come_apart() {
-    let mut panels = vec![rectangle("a", 0.2, 0.2), rectangle("b", 0.2, 0.2)];
-    for panel in &mut panels {
-        panel.placement = Placement {
-            translation: Vec3::new(0.0, 0.1, 0.0),
-            ..Placement::default()
-        };
-    }
-    let garment = Garment {
-        panels,
+/// Two squares placed so that one is where the other is.
+fn coincident(rotations: [Rotation; 2]) -> Garment {
+    let panels = ["a", "b"]
+        .into_iter()
+        .zip(rotations)
+        .map(|(name, rotation)| {
+            let center = rotation * Vec3::new(0.1, 0.1, 0.0);
+            let placement = Placement {
+                rotation,
+                translation: Vec3::new(0.0, 0.2, 0.0) - center,
+            };
+            Panel {
+                placement,
+                ..rectangle(name, 0.2, 0.2)
+            }
+        });
+    Garment {
+        panels: panels.collect(),
         fabrics: vec![Fabric::default()],
         edge_length: 0.025,
         ..Garment::default()
-    };
-    let mut sim = Sim::new(&garment, &SimOptions::default()).unwrap();
+    }
+}
+
+#[test]
+fn coincident_panels_drape_apart() {
+    let flat = Rotation::from_axis_angle(&Vec3::x_axis(), -FRAC_PI_2);
+    let turned = Rotation::from_axis_angle(&Vec3::y_axis(), PI) * flat;
+    let flipped = Rotation::from_axis_angle(&Vec3::x_axis(), FRAC_PI_2);
+    for (name, second) in [("alike", flat), ("turned", turned), ("flipped", flipped)] {
+        let mut sim = Sim::new(&coincident([flat, second]), &SimOptions::default()).unwrap();
+        let ball = Body::sphere(0.08).unwrap();
+        sim.add_body(&ball, &ContactSettings::default()).unwrap();
+        let report = sim.drape(&to_tolerance(), &mut |_| true).unwrap();
+        let crossed = uncrossed(&sim);
+        println!(
+            "{name}: {:?} after {}, strain {:.4}, crossings {crossed}",
+            report.outcome, report.newton_iterations, report.max_edge_strain,
+        );
+        assert_eq!(report.outcome, Outcome::Converged);
+        assert_eq!(crossed, 0);
+        assert!(report.max_edge_strain < 0.02);
+    }
+}
+
+#[test]
+fn coincident_panels_come_apart() {
+    let mut sim = Sim::new(
+        &coincident([Rotation::identity(); 2]),
+        &SimOptions::default(),
+    )
+    .unwrap();
     let half = sim.mesh().panel_starts[1] as usize;
     let gap = |sim: &Sim| {
         let (a, b) = sim.positions().split_at(half);

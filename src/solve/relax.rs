@@ -10,6 +10,7 @@ use super::pace::Pace;
 use super::step::Totals;
 use crate::error::{Error, Result, Status};
 use crate::math::Vec3;
+use crate::math::boxtree::{Aabb, BoxTree};
 use crate::system::state::{Pin, State};
 
 /// When a relaxation stops.
@@ -167,9 +168,13 @@ pub fn relax(
 }
 
 /// Moves every free vertex a little, each in its own direction: a sheet that hangs exactly in its
-/// plane has no force across it, however unstable it is, and would fold within the plane.
+/// plane has no force across it, however unstable it is, and would fold within the plane. Vertices that
+/// lie on others stay, for each of a layer to leave the other layer on the same side.
 fn disturb(state: &mut State, size: f64) {
-    let mut pins = state.pins.iter().map(|p| p.vertex as usize).peekable();
+    let mut stays = lie_on_others(&state.positions, size);
+    for pin in &state.pins {
+        stays[pin.vertex as usize] = true;
+    }
     let mut bits = 0x9E37_79B9_7F4A_7C15_u64;
     for (i, x) in state.positions.iter_mut().enumerate() {
         let offset = Vec3::from_fn(|_, _| {
@@ -179,8 +184,26 @@ fn disturb(state: &mut State, size: f64) {
             bits ^= bits << 17;
             (bits >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
         });
-        if pins.next_if_eq(&i).is_none() {
+        if !stays[i] {
             *x += offset * size;
         }
     }
+}
+
+/// Which points have another one within a distance along every axis.
+fn lie_on_others(x: &[Vec3], distance: f64) -> Vec<bool> {
+    let tree = BoxTree::new(x);
+    let boxes = tree.fit(|i| Aabb::of(&[x[i as usize]]));
+    let reach = Vec3::repeat(distance);
+    (0..)
+        .zip(x)
+        .map(|(i, p)| {
+            let mut found = false;
+            let around = Aabb::of(&[p - reach, p + reach]);
+            tree.query(&boxes, &around, |j| {
+                found |= j != i && (x[j as usize] - p).amax() <= distance;
+            });
+            found
+        })
+        .collect()
 }

@@ -17,7 +17,8 @@
 //!
 //! `c` is zero except for pairs that meet in a plane: coincident panels have no side to be pushed
 //! to. Then `c` points along the outside normal of the cloth at `a` (or against it, where `b` already
-//! is on that side), 0.02 `d0` long: enough for the forces to have a way out.
+//! is on that side by 0.001 `d0`), 0.02 `d0` long: enough for the forces to have a way out, and the same
+//! way for all neighbours, however a relaxation disturbs them.
 //!
 //! Spheres do not slip off each other's cloth as planes would: layers feel a bumpy surface, with
 //! bumps of the order of the square of the edge length over the radius. Layers lie `d0` apart at
@@ -25,7 +26,7 @@
 
 use super::friction::{Friction, kept};
 use super::spheres::{Grid, Spheres};
-use super::travel;
+use super::travel::{self, COINCIDENT};
 use crate::cloth::Cloth;
 use crate::error::{Error, Result};
 use crate::math::{Mat3, Vec3};
@@ -206,7 +207,7 @@ impl SelfContact {
         };
         let height = w.dot(&outside);
         let bias = if height.abs() < FLAT * distance && w.norm() < distance {
-            let below = height < -1e-9 * distance;
+            let below = height < -COINCIDENT * distance;
             outside * (FLAT * distance * if below { -1.0 } else { 1.0 })
         } else {
             Vec3::zeros()

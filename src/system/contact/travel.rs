@@ -4,7 +4,7 @@
 //! taken to move on straight lines, and no pair of spheres may on its way come nearer than
 //! `min(safe distance, 0.7 of its distance at the start)`: above the safe distance no edge slips
 //! through (see [`super::spheres`]), and a pair that is already nearer may always use some of
-//! what is left. Common motion costs nothing: nodes of a tree over the vertices meet when the box
+//! what is left. Pairs that coincide have no side to keep to and may part in any direction. Common motion costs nothing: nodes of a tree over the vertices meet when the box
 //! of their relative places, swept by the box of their relative displacements, reaches a contact.
 
 use super::spheres::Spheres;
@@ -13,6 +13,8 @@ use crate::math::boxtree::{Aabb, BoxTree};
 
 /// Part of its distance that a pair keeps in any step.
 const KEPT: f64 = 0.7;
+/// Part of the distance at which a pair touches below which it coincides.
+pub(super) const COINCIDENT: f64 = 1e-3;
 
 /// Largest part (0 to 1) of the way from `x0` to `x` on which no pair of spheres passes through
 /// each other.
@@ -37,7 +39,11 @@ pub fn max_travel(spheres: &Spheres, x0: &[Vec3], x: &[Vec3]) -> f64 {
         }
         let from = x0[b as usize] - x0[a as usize];
         let by = x[b as usize] - x[a as usize] - from;
-        let limit = spheres.safe_distance(a, b).min(KEPT * from.norm());
+        let distance = from.norm();
+        if distance < COINCIDENT * spheres.rest_distance(a, b) {
+            return;
+        }
+        let limit = spheres.safe_distance(a, b).min(KEPT * distance);
         if let Some(t) = first_time(&from, &by, limit)
             && t < fraction
             && !spheres.excluded(a, b)
