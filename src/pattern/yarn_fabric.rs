@@ -14,7 +14,7 @@
 //! Cirio et al. 2017, table 1. The woven presets are shirtings of 20 yarns to the centimetre with a
 //! radius of a quarter of the pitch (37 tex, 150 g/m^2).
 
-use super::chart::Chart;
+use super::chart::{Chart, Stitch};
 use crate::error::{Error, Result};
 use std::f64::consts::PI;
 
@@ -188,6 +188,11 @@ impl Mask {
         Err(self.over.chunks(self.width).map(line).collect())
     }
 
+    /// Warp and weft yarns of the repeat.
+    pub fn size(&self) -> [usize; 2] {
+        [self.width, self.over.len() / self.width]
+    }
+
     /// Whether warp `i` lies in front of weft `j`.
     pub fn warp_over(&self, i: usize, j: usize) -> bool {
         let height = self.over.len() / self.width;
@@ -201,6 +206,18 @@ impl Structure {
         match self {
             Self::Woven(weave) => [weave.warp_pitch, weave.weft_pitch],
             Self::Knitted(knit) => [knit.loop_width, knit.loop_height],
+        }
+    }
+
+    /// Yarns or loops across, wefts or courses along, after which the fabric repeats.
+    pub fn repeat(&self) -> [usize; 2] {
+        match self {
+            Self::Woven(weave) => weave.mask.size(),
+            Self::Knitted(knit) => {
+                let rows = knit.chart.resolved(true);
+                let loops = |row: &Vec<_>| row.iter().map(Stitch::makes).sum::<usize>();
+                [rows.iter().map(loops).max().unwrap_or(1), rows.len()]
+            }
         }
     }
 }

@@ -106,7 +106,8 @@ impl YarnMesh {
             + size_of_val(&self.ties[..])
             + size_of_val(&self.across[..])
             + size_of_val(&self.outside[..])
-            + size_of_val(&self.alpha[..]);
+            + size_of_val(&self.alpha[..])
+            + size_of_val(&self.images[..]);
         Counts {
             nodes: self.uv.len(),
             yarns: self.yarn_count(),
