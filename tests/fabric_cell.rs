@@ -6,9 +6,10 @@ use crate::yarn_sims::{WHOLE, patch, sim};
 use nalgebra::{Matrix3x2, Rotation3, Vector3};
 use toile::fabric::PeriodicCell;
 use toile::fabric::fit::{Range, fit};
+use toile::fabric::rest::cells;
 use toile::pattern::YarnFabric;
 use toile::pattern::import::fabric_from_json;
-use toile::sim::DrapeOptions;
+use toile::sim::{DrapeOptions, Outcome};
 use toile::solve::settings::Settings;
 
 /// A cell of a preset whose contacts are held, or not.
@@ -257,4 +258,60 @@ fn tests_that_cannot_be_are_refused() {
         .err()
         .unwrap();
     assert!(error.message.contains("repeat"), "{}", error.message);
+}
+
+/// Area at rest over the laid one: of the parallelograms from each contact to those two loops across and two courses on.
+fn kept_area(yarns: &str, side: f64) -> f64 {
+    let text = patch(yarns, side, side, WHOLE);
+    let mut sim = sim(&text, 0.0, &[]);
+    let options = DrapeOptions {
+        force_tolerance: 1e-5,
+        max_steps: 6000,
+    };
+    let report = sim.drape(&options, &mut |_| true).unwrap();
+    assert_eq!(report.outcome, Outcome::Converged, "{report:?}");
+    let cell = cells(sim.garment(), |_| true, &Settings::default()).unwrap()[0];
+    let structure = &sim.garment().fabrics[0].yarns.as_ref().unwrap().structure;
+    let [w, h] = structure.pitch();
+    let steps = [2.0 * w * cell.across, 2.0 * h * cell.along];
+    let mesh = sim.yarns().unwrap();
+    let x = sim.yarn_nodes();
+    let crossed = |n: &u32| mesh.stack(*n as usize).len() > 1;
+    let contacts: Vec<u32> = (0..mesh.uv.len() as u32).filter(crossed).collect();
+    let (mut area, mut laid) = (0.0, 0.0);
+    for n in &contacts {
+        let at = |dx: f64, dy: f64| {
+            let there = mesh.uv[*n as usize] + toile::math::Vec2::new(dx, dy);
+            let near = |m: &&u32| (mesh.uv[**m as usize] - there).norm() < 0.02 * w;
+            contacts
+                .iter()
+                .find(near)
+                .map(|m| x[*m as usize] - x[*n as usize])
+        };
+        if let (Some(a), Some(b)) = (at(steps[0], 0.0), at(0.0, steps[1])) {
+            area += a.cross(&b).norm();
+            laid += steps[0] * steps[1];
+        }
+    }
+    assert!(laid > 0.0);
+    println!("{yarns} {side} m: {:.4} of the laid area", area / laid);
+    area / laid
+}
+
+/// A garter swatch that is laid as its numbers say draws in; compensated ones keep their area within 1 %, and so does a weave.
+#[test]
+fn compensated_fabrics_keep_their_size() {
+    let bare = kept_area(r#"{"preset": "sweater"}"#, 0.03);
+    assert!(bare < 0.97, "{bare}");
+    for (yarns, side) in [
+        (r#"{"preset": "sweater", "compensated": true}"#, 0.024),
+        (r#"{"preset": "sweater", "compensated": true}"#, 0.03),
+        (
+            r#"{"preset": "plain shirting", "compensated": true}"#,
+            0.006,
+        ),
+    ] {
+        let kept = kept_area(yarns, side);
+        assert!((kept - 1.0).abs() < 0.01, "{yarns} {side}: {kept}");
+    }
 }

@@ -14,7 +14,12 @@
 use super::cell::PeriodicCell;
 use crate::error::{Error, Result};
 use crate::math::{Mat2, Vec2};
+use crate::pattern::Garment;
+use crate::pattern::yarn_fabric::YarnFabric;
+use crate::solve::settings::Settings;
+use crate::yarn::Cell;
 use nalgebra::{Matrix3x2, SymmetricEigen};
+use std::sync::{Mutex, PoisonError};
 
 /// Force to which nodes come to rest, over the stress times the cell's width.
 const FORCE: f64 = 1e-9;
@@ -38,6 +43,51 @@ pub struct Rest {
     pub stress: f64,
     /// Corrections of everything inside.
     pub corrections: u64,
+}
+
+/// Most fabrics whose sizes are remembered.
+const REMEMBERED: usize = 64;
+
+/// What a size at rest is a function of.
+type Key = (YarnFabric, Vec<(String, f64)>);
+
+/// Sizes found while the program runs.
+static KNOWN: Mutex<Vec<(Key, Cell)>> = Mutex::new(Vec::new());
+
+/// How the fabrics of a garment are laid: compensated ones at their size at rest, if the garment is laid as yarns there
+/// (`laid`, by fabric).
+pub fn cells(
+    garment: &Garment,
+    laid: impl Fn(usize) -> bool,
+    settings: &Settings,
+) -> Result<Vec<Cell>> {
+    let cell = |k: usize| match &garment.fabrics[k].yarns {
+        Some(yarns) if yarns.compensated && laid(k) => compensated(yarns, settings)
+            .map_err(|e| e.at(format!("fabric '{}'", garment.fabrics[k].name))),
+        _ => Ok(Cell::default()),
+    };
+    (0..garment.fabrics.len()).map(cell).collect()
+}
+
+fn compensated(yarns: &YarnFabric, settings: &Settings) -> Result<Cell> {
+    let known = || KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+    let key = (yarns.clone(), settings.that_matter());
+    if let Some((_, cell)) = known().iter().find(|(other, _)| *other == key) {
+        return Ok(*cell);
+    }
+    let found = rest(&mut PeriodicCell::new(yarns, [1, 1], settings)?)?;
+    let [across, along] = found.factors;
+    let cell = Cell {
+        across,
+        along,
+        rest: 1.0,
+    };
+    let mut known = known();
+    if known.len() == REMEMBERED {
+        known.remove(0);
+    }
+    known.push((key, cell));
+    Ok(cell)
 }
 
 /// `diag(factors)` as a gradient to space.

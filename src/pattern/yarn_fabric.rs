@@ -102,6 +102,8 @@ pub struct YarnFabric {
     pub damping_mass: f64,
     /// Stiffness-proportional damping [s].
     pub damping_stiffness: f64,
+    /// Whether it is laid with the distances of yarns at which it is at rest.
+    pub compensated: bool,
 }
 
 /// Weaves known by name.
@@ -240,6 +242,7 @@ impl YarnFabric {
             sliding_damping: 0.01,
             damping_mass: 2.0,
             damping_stiffness: 0.01,
+            compensated: false,
         };
         fabric.derive();
         fabric
@@ -373,6 +376,10 @@ impl YarnFabric {
                 fit(names[1], b, LEAST_HEIGHT * a, reason)?;
                 if !knit.once {
                     knit.chart.check_repeat().map_err(|e| e.at("yarns"))?;
+                } else if self.compensated {
+                    return Err(Error::material(
+                        "yarns.compensated: a chart that is the whole piece has no repeat to bring to rest",
+                    ));
                 }
                 Ok(())
             }
