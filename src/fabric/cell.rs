@@ -66,6 +66,8 @@ pub struct PeriodicCell {
     yarns: Arc<Yarns>,
     images: Vec<NodeImage>,
     size: Vec2,
+    /// Larger pitch [m].
+    apart: f64,
     bend: Option<Bend>,
 }
 
@@ -103,6 +105,7 @@ impl PeriodicCell {
             yarns,
             images: cell.images,
             size,
+            apart: pitch.max(),
             bend: None,
         };
         cell.engine
@@ -133,6 +136,17 @@ impl PeriodicCell {
     /// Yarns, with the images of the cell's nodes.
     pub fn yarns(&self) -> &Yarns {
         &self.yarns
+    }
+
+    /// Distances as laid and now of two nodes that were laid a pitch apart or more and are now nearer than yarns are thick [m].
+    pub(super) fn touching(&self) -> Option<[f64; 2]> {
+        let mesh = &self.yarns.mesh;
+        let radius = self.yarns.materials.first().map_or(0.0, |m| m.radius);
+        let x = self.nodes();
+        let own = (0..x.len()).filter(|n| mesh.is_inside(*n as u32));
+        own.flat_map(|a| (0..x.len()).map(move |b| (a, b)))
+            .map(|(a, b)| [(mesh.uv[a] - mesh.uv[b]).norm(), (x[a] - x[b]).norm()])
+            .find(|[laid, now]| *laid >= self.apart && *now < 2.0 * radius)
     }
 
     /// Positions of the yarns' nodes [m].
@@ -196,6 +210,7 @@ impl PeriodicCell {
             yarns: self.yarns.clone(),
             images: self.images.clone(),
             size: self.size,
+            apart: self.apart,
             bend: Some(bend),
         };
         cell.engine

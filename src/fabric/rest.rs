@@ -117,6 +117,12 @@ pub fn rest(cell: &mut PeriodicCell) -> Result<Rest> {
         cell.stretch(&sized(factors.into()));
         corrections += cell.relax(FORCE)?;
         if step.amax() < STEADY {
+            if let Some([laid, now]) = cell.touching() {
+                return Err(Error::material(format!(
+                    "at rest ({:.3} of its width, {:.3} of its height) the fabric folds onto itself: yarns {laid:.2e} m apart as laid are {now:.2e} m apart, and layers of a periodic cell do not touch",
+                    factors.x, factors.y
+                )));
+            }
             cell.set_sliding(false)?;
             return Ok(Rest {
                 factors: factors.into(),
