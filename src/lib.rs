@@ -8,6 +8,7 @@ pub mod body;
 pub mod capi;
 pub mod cloth;
 pub mod error;
+pub mod fabric;
 pub mod fmi;
 pub mod math;
 pub mod pattern;

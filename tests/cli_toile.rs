@@ -576,3 +576,31 @@ fn report_compares_models_and_leaves_its_files() {
     assert!(text(&std::fs::read(out.join("report.csv")).unwrap()).starts_with("name,kind"));
     assert!(text(&std::fs::read(out.join("report.html")).unwrap()).contains("swatch"));
 }
+
+/// `fabric` prints a material, writes plots and a fabric that is read again with it; what has no yarns is refused.
+#[test]
+fn a_fabric_gets_the_material_of_its_yarns() {
+    let folder = Folder::new("fabric");
+    let yarns = json!({"name": "shirting", "yarns": {"preset": "plain shirting"}});
+    let file = folder.write("shirting.json", &yarns.to_string());
+    let out = folder.0.join("out");
+    let output = toile(&["fabric", path(&file), "--out", path(&out)]);
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    let printed = text(&output.stdout);
+    assert!(printed.contains("membrane.weft"), "{printed}");
+    let made = std::fs::read_to_string(out.join("fabric.json")).unwrap();
+    let (fabric, _) = toile::pattern::import::fabric_from_json(&made).unwrap();
+    assert!((fabric.weft / 981.7 - 1.0).abs() < 0.01, "{}", fabric.weft);
+    assert!(fabric.yarns.is_some() && fabric.name == "shirting");
+    for plot in ["membrane.svg", "bending.svg"] {
+        assert!(
+            std::fs::read_to_string(out.join(plot))
+                .unwrap()
+                .contains("<svg")
+        );
+    }
+    let bare = folder.write("bare.json", r#"{"name": "bare"}"#);
+    let output = toile(&["fabric", path(&bare)]);
+    assert_eq!(code(&output), 1);
+    assert!(text(&output.stderr).contains("no yarns"));
+}

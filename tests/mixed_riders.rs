@@ -85,12 +85,16 @@ impl Term for Quadratic {
     }
 }
 
-/// Points 0 to 5 are free, 6 to 8 ride; one of them just outside of its triangle.
+/// Points 0 to 5 are free, 6 to 8 ride; one of them just outside of its triangle, one turned.
 fn riders() -> Riders {
     let rider = |point, vertices, weights| Rider {
         point,
         vertices,
         weights,
+        turn: match point {
+            8 => nalgebra::Rotation3::from_euler_angles(0.3, -0.8, 1.1).into_inner(),
+            _ => Mat3::identity(),
+        },
     };
     Riders::new(vec![
         rider(6, [0, 1, 2], [0.2, 0.3, 0.5]),
@@ -135,7 +139,9 @@ fn what_belongs_to_riders_goes_to_their_carriers_by_the_transpose() {
                 None => b[(row, row)] = 1.0,
                 Some(r) => {
                     for (v, w) in r.vertices.iter().zip(&r.weights) {
-                        b[(row, 3 * *v as usize + c)] = *w;
+                        for d in 0..3 {
+                            b[(row, 3 * *v as usize + d)] = *w * r.turn[(c, d)];
+                        }
                     }
                 }
             }
@@ -213,6 +219,7 @@ fn riders_on_riders_are_refused() {
         point,
         vertices: [0, 1, on],
         weights: [0.25, 0.25, 0.5],
+        turn: Mat3::identity(),
     };
     let error = Riders::new(vec![rider(6, 2), rider(7, 6)]).unwrap_err();
     assert!(error.message.contains("rides itself"), "{}", error.message);

@@ -53,6 +53,8 @@ mod cli_toile;
 mod docs;
 #[path = "drape_ends.rs"]
 mod drape_ends;
+#[path = "fabric_cell.rs"]
+mod fabric_cell;
 #[path = "fmi.rs"]
 mod fmi;
 #[path = "hard_cases.rs"]

@@ -93,7 +93,7 @@ pub fn join(
         1.0 - blended_weight(&alpha).min(1.0 - YarnMesh::LEAST_ALPHA)
     };
     let own: Vec<f64> = (0..count).map(part).collect();
-    let (yarns, nodes) = laid.part(&inside);
+    let (yarns, nodes, _) = laid.part(&inside);
     let first = mesh.uv.len() as u32;
     let riders = Riders::new(in_part(list, &nodes, first))?;
     let enriched = |t: usize| region.hybrid[t] || (options.everywhere && region.full[t]);

@@ -6,8 +6,8 @@
 
 use super::riders::Rider;
 use crate::error::Result;
-use crate::math::Vec2;
 use crate::math::geometry::cross2;
+use crate::math::{Mat3, Vec2};
 use crate::pattern::Garment;
 use crate::tri::{GarmentMesh, Transfer};
 use crate::yarn::{Family, YarnMaterial, YarnMesh};
@@ -59,6 +59,7 @@ impl Places {
             point: node,
             vertices: mesh.triangles[self.map.triangle[k] as usize],
             weights: self.map.weights[k],
+            turn: Mat3::identity(),
         }
     }
 

@@ -50,7 +50,7 @@ pub fn join(
         joined.yarns = laid;
         return Ok(joined);
     }
-    let (yarns, nodes) = laid.part(&inside);
+    let (yarns, nodes, _) = laid.part(&inside);
     joined.yarns = yarns;
     joined.coupling = Coupling {
         riders: Riders::new(in_part(list, &nodes, mesh.uv.len() as u32))?,

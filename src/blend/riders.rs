@@ -1,24 +1,28 @@
-//! Points that ride on triangles: their places are fixed combinations of vertices.
+//! Points that ride on others: their places are fixed combinations of those, such as of the vertices of a triangle.
 //!
 //! ```text
-//! x_r = sum_k b_k x_k,   dV/dx_k += b_k dV/dx_r,   d2V/dx_j dx_k += b_j b_k d2V/dx_r2
+//! x_r = Q sum_k b_k x_k,   dV/dx_k += b_k Q^T dV/dx_r,   d2V/dx_j dx_k += b_j b_k Q^T d2V/dx_r2 Q
 //! ```
+//!
+//! `Q` turns images in a cell that is bent, and is the identity elsewhere.
 //!
 //! The transpose of the map `B` of Casafranca et al. 2020 (equation 1) without displacements: energies know
 //! nothing of it, the assembly hands what belongs to a rider to the vertices that carry it.
 
 use crate::error::{Error, Result};
-use crate::math::Vec3;
+use crate::math::{Mat3, Vec3};
 
 /// A point and the vertices that carry it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rider {
     /// Number of the point.
     pub point: u32,
-    /// Vertices of its triangle, which ride on nothing.
+    /// Points that carry it, which ride on nothing: the vertices of its triangle.
     pub vertices: [u32; 3],
-    /// Their weights, of sum 1.
+    /// Their weights; of sum 1 on a triangle.
     pub weights: [f64; 3],
+    /// `Q`.
+    pub turn: Mat3,
 }
 
 const NONE: u32 = u32::MAX;
@@ -29,6 +33,8 @@ pub struct Riders {
     list: Vec<Rider>,
     /// Place in the list of each point, up to the last rider.
     place: Vec<u32>,
+    /// Whether one of them is turned.
+    turns: bool,
 }
 
 impl Riders {
@@ -44,7 +50,8 @@ impl Riders {
                 )));
             }
         }
-        let riders = Self { list, place };
+        let turns = list.iter().any(|r| r.turn != Mat3::identity());
+        let riders = Self { list, place, turns };
         for rider in &riders.list {
             if let Some(v) = rider.vertices.iter().find(|v| riders.rides(**v)) {
                 return Err(Error::argument(format!(
@@ -67,6 +74,11 @@ impl Riders {
         self.list.get(*place as usize)
     }
 
+    /// `Q` of a point; none where no point of the system is turned.
+    pub fn turn(&self, point: u32) -> Option<Mat3> {
+        (self.turns).then(|| self.of(point).map_or_else(Mat3::identity, |r| r.turn))
+    }
+
     /// Whether a point rides.
     pub fn rides(&self, point: u32) -> bool {
         self.of(point).is_some()
@@ -75,9 +87,10 @@ impl Riders {
     /// Gives the riders the values that those of their vertices make.
     pub fn carry(&self, values: &mut [Vec3]) {
         for r in &self.list {
-            values[r.point as usize] = (r.vertices.iter().zip(&r.weights))
+            let sum: Vec3 = (r.vertices.iter().zip(&r.weights))
                 .map(|(v, w)| values[*v as usize] * *w)
                 .sum();
+            values[r.point as usize] = if self.turns { r.turn * sum } else { sum };
         }
     }
 }

@@ -14,7 +14,7 @@
 //! Cirio et al. 2017, table 1. The woven presets are shirtings of 20 yarns to the centimetre with a
 //! radius of a quarter of the pitch (37 tex, 150 g/m^2).
 
-use super::chart::Chart;
+use super::chart::{Chart, Stitch};
 use crate::error::{Error, Result};
 use std::f64::consts::PI;
 
@@ -102,6 +102,8 @@ pub struct YarnFabric {
     pub damping_mass: f64,
     /// Stiffness-proportional damping [s].
     pub damping_stiffness: f64,
+    /// Whether it is laid with the distances of yarns at which it is at rest.
+    pub compensated: bool,
 }
 
 /// Weaves known by name.
@@ -188,6 +190,11 @@ impl Mask {
         Err(self.over.chunks(self.width).map(line).collect())
     }
 
+    /// Warp and weft yarns of the repeat.
+    pub fn size(&self) -> [usize; 2] {
+        [self.width, self.over.len() / self.width]
+    }
+
     /// Whether warp `i` lies in front of weft `j`.
     pub fn warp_over(&self, i: usize, j: usize) -> bool {
         let height = self.over.len() / self.width;
@@ -201,6 +208,18 @@ impl Structure {
         match self {
             Self::Woven(weave) => [weave.warp_pitch, weave.weft_pitch],
             Self::Knitted(knit) => [knit.loop_width, knit.loop_height],
+        }
+    }
+
+    /// Yarns or loops across, wefts or courses along, after which the fabric repeats.
+    pub fn repeat(&self) -> [usize; 2] {
+        match self {
+            Self::Woven(weave) => weave.mask.size(),
+            Self::Knitted(knit) => {
+                let rows = knit.chart.resolved(true);
+                let loops = |row: &Vec<_>| row.iter().map(Stitch::makes).sum::<usize>();
+                [rows.iter().map(loops).max().unwrap_or(1), rows.len()]
+            }
         }
     }
 }
@@ -223,6 +242,7 @@ impl YarnFabric {
             sliding_damping: 0.01,
             damping_mass: 2.0,
             damping_stiffness: 0.01,
+            compensated: false,
         };
         fabric.derive();
         fabric
@@ -356,6 +376,10 @@ impl YarnFabric {
                 fit(names[1], b, LEAST_HEIGHT * a, reason)?;
                 if !knit.once {
                     knit.chart.check_repeat().map_err(|e| e.at("yarns"))?;
+                } else if self.compensated {
+                    return Err(Error::material(
+                        "yarns.compensated: a chart that is the whole piece has no repeat to bring to rest",
+                    ));
                 }
                 Ok(())
             }

@@ -6,6 +6,7 @@ use crate::blend::embed::carried;
 use crate::blend::{Coupling, Filter, Follow, Joined, Region, direct};
 use crate::cloth::Cloth;
 use crate::error::{Error, Result};
+use crate::fabric::rest::cells;
 use crate::math::Vec3;
 use crate::pattern::Garment;
 use crate::readout::yarns::{Curve, curves};
@@ -53,10 +54,13 @@ impl YarnPart {
         if wanted.is_empty() {
             return Ok(None);
         }
+        let used =
+            |fabric: usize| (wanted.iter()).any(|p| garment.panels[*p as usize].fabric == fabric);
+        let cells = cells(garment, used, settings)?;
         let layout = Layout {
             panels: Some(&wanted),
+            cells: &cells,
             max_nodes: settings.max_yarn_nodes as usize,
-            ..Layout::default()
         };
         let laid = lay(garment, &layout)?;
         let materials: Vec<YarnMaterial> = garment

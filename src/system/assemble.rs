@@ -33,6 +33,8 @@ struct Share {
 struct Spreads {
     starts: Vec<u32>,
     shares: Vec<Share>,
+    /// How the block of each spread is turned from its left and its right; empty where none is.
+    turns: Vec<[Mat3; 2]>,
 }
 
 /// The matrix of a system and where each stencil's blocks go in it.
@@ -88,7 +90,7 @@ impl Assembler {
         }
         let mut spreads = Spreads {
             starts: vec![0],
-            shares: Vec::new(),
+            ..Spreads::default()
         };
         self.plans = terms
             .iter()
@@ -112,6 +114,7 @@ impl Assembler {
         self.plans.iter().map(|p| p.len() * 4).sum::<usize>()
             + self.spreads.starts.len() * 4
             + self.spreads.shares.len() * size_of::<Share>()
+            + size_of_val(&self.spreads.turns[..])
             + self.matrix.blocks.len() * 76
             + self.gradients.len() * 24
             + self.blocks.len() * 72
@@ -164,6 +167,8 @@ impl Assembler {
                         match self.riders.of(*v) {
                             None => out[*v as usize] += g,
                             Some(rider) => {
+                                let turn = self.riders.turn(*v);
+                                let g = turn.map_or(*g, |q| q.transpose() * g);
                                 for (v, w) in rider.vertices.iter().zip(&rider.weights) {
                                     out[*v as usize] += g * *w;
                                 }
@@ -229,11 +234,16 @@ impl Spreads {
             }
         }
         self.starts.push(self.shares.len() as u32);
+        if let (Some(left), Some(right)) = (riders.turn(i), riders.turn(j)) {
+            self.turns.push([left.transpose(), right]);
+        }
         self.starts.len() as u32 - 2
     }
 
     fn add(&self, k: usize, block: &Mat3, matrix: &mut BlockMatrix) {
         let range = self.starts[k] as usize..self.starts[k + 1] as usize;
+        let turned = self.turns.get(k).map(|[left, right]| left * block * right);
+        let block = turned.as_ref().unwrap_or(block);
         for share in &self.shares[range] {
             let target = &mut matrix.blocks[(share.slot & !TRANSPOSED) as usize];
             let part = block * share.weight;

@@ -213,8 +213,8 @@ impl System {
         x.extend_from_slice(&state.positions);
         self.points.coupling.carry(x);
         x.resize(self.block_count(), Vec3::zeros());
-        for (u, slot) in state.u.iter().zip(&self.unknowns.slides) {
-            if let Some((block, c)) = slot {
+        for (i, (u, slot)) in state.u.iter().zip(&self.unknowns.slides).enumerate() {
+            if let (Some((block, c)), None) = (slot, self.unknowns.shift(i)) {
                 x[*block as usize][usize::from(*c)] = *u;
             }
         }
@@ -230,6 +230,10 @@ impl System {
             state.u_rates[i] = 0.0;
             if let Some((block, c)) = slot {
                 let (block, c) = (*block as usize, usize::from(*c));
+                if let Some(shift) = self.unknowns.shift(i) {
+                    state.u[i] = x[block][c] + shift;
+                    continue;
+                }
                 state.u[i] = x[block][c];
                 state.u_rates[i] = (x[block][c] - start[block][c]) / h;
             }

@@ -1,7 +1,7 @@
 //! Puts a [`YarnMesh`] together yarn by yarn, and remembers where yarns end.
 
 use super::{Family, Incidence, Strand, YarnMesh};
-use crate::math::Vec2;
+use crate::math::{Mat2, Vec2};
 
 /// A node at an edge of its panel: the end of a yarn, or of a finished border.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,6 +27,8 @@ pub(super) struct Place {
 pub(super) struct Builder {
     pub mesh: YarnMesh,
     places: Vec<Place>,
+    /// From a step on the panel to the same one in the nominal layout.
+    pub nominal: Mat2,
     pub edge_nodes: Vec<EdgeNode>,
 }
 
@@ -40,15 +42,15 @@ impl Builder {
         mesh.uv.len() as u32 - 1
     }
 
-    /// The yarn passes a node, `rest` times the straight distance after its last one; the index of
+    /// The yarn passes a node, the straight distance of the nominal layout after its last one; the index of
     /// the incidence.
-    pub(super) fn pass(&mut self, node: u32, place: Place, rest: f64) -> u32 {
+    pub(super) fn pass(&mut self, node: u32, place: Place) -> u32 {
         let mesh = &mut self.mesh;
         let first = mesh.starts.last().copied().unwrap_or(0) as usize;
         let u = match mesh.incidences.get(first..).and_then(<[Incidence]>::last) {
             Some(last) => {
                 let step = mesh.uv[node as usize] - mesh.uv[last.node as usize];
-                last.u + rest * step.norm()
+                last.u + (self.nominal * step).norm()
             }
             None => 0.0,
         };

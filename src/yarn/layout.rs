@@ -7,6 +7,7 @@ use super::builder::Builder;
 use super::region::Region;
 use super::{YarnMesh, rods, stitch, weave};
 use crate::error::{Error, Result};
+use crate::math::Mat2;
 use crate::pattern::Garment;
 use crate::pattern::yarn_fabric::{Structure, YarnFabric};
 
@@ -15,15 +16,15 @@ pub const DEFAULT_MAX_NODES: usize = 5_000_000;
 /// Indices are 32 bits wide and a node has several passages.
 const MOST_NODES: usize = 1 << 28;
 
-/// How a fabric is laid against what its numbers say: a relaxed fabric has another pitch, and yarns
-/// longer than their straight way.
+/// How a fabric is laid against what its numbers say: a fabric at rest has another pitch, its yarns the length that they
+/// have there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
     /// Laid over nominal distance across: of warp yarns, of loops along a course.
     pub across: f64,
     /// Laid over nominal distance along: of weft yarns, of courses.
     pub along: f64,
-    /// Length of yarn at rest over its laid length.
+    /// Length of yarn over that of the nominal layout.
     pub rest: f64,
 }
 
@@ -106,7 +107,8 @@ impl YarnMesh {
             + size_of_val(&self.ties[..])
             + size_of_val(&self.across[..])
             + size_of_val(&self.outside[..])
-            + size_of_val(&self.alpha[..]);
+            + size_of_val(&self.alpha[..])
+            + size_of_val(&self.images[..]);
         Counts {
             nodes: self.uv.len(),
             yarns: self.yarn_count(),
@@ -150,6 +152,7 @@ pub fn lay(garment: &Garment, layout: &Layout<'_>) -> Result<YarnMesh> {
         let cell = layout.cell(fabric);
         let (index, panel) = (fabric as u32, p as u32);
         let before = builder.mesh.yarn_count();
+        builder.nominal = region.nominal(&cell);
         match &yarns.structure {
             Structure::Woven(woven) => {
                 weave::lay(
@@ -182,6 +185,8 @@ pub fn lay(garment: &Garment, layout: &Layout<'_>) -> Result<YarnMesh> {
             ))));
         }
     }
+    // rods are as long as they are laid
+    builder.nominal = Mat2::identity();
     rods::sew(&mut builder, garment, &panels)?;
     let mesh = builder.finish();
     mesh.check()?;

@@ -12,6 +12,7 @@ mod knit;
 pub mod layout;
 pub mod material;
 pub mod part;
+pub mod periodic;
 mod piece;
 mod region;
 mod rods;
@@ -64,6 +65,8 @@ pub struct YarnMesh {
     pub outside: Vec<bool>,
     /// `alpha` of each node: how much of the cloth there its yarns are; empty where they are all of it.
     pub alpha: Vec<f64>,
+    /// Passages whose coordinates follow from others', in a [`periodic`] cell alone.
+    pub images: Vec<Image>,
 }
 
 /// Yarns and what they are made of.
@@ -95,6 +98,15 @@ pub struct Incidence {
     pub u: f64,
     /// Whether the yarn may slide here; false at ends, at nodes of one yarn and at seams.
     pub slides: bool,
+}
+
+/// A passage through the image of a node: its coordinate is that of the passage `of`, as far away as it was laid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Image {
+    /// The passage.
+    pub incidence: u32,
+    /// Whose coordinate it has.
+    pub of: u32,
 }
 
 /// What a yarn is.

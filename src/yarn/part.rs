@@ -14,8 +14,9 @@ const NONE: u32 = u32::MAX;
 const REACH: usize = 2;
 
 impl YarnMesh {
-    /// The part that the nodes with `inside` reach, and the number that each of its nodes has here.
-    pub fn part(&self, inside: &[bool]) -> (Self, Vec<u32>) {
+    /// The part that the nodes with `inside` reach, the number that each of its nodes has here, and that
+    /// each passage has there, `u32::MAX` where it has none.
+    pub fn part(&self, inside: &[bool]) -> (Self, Vec<u32>, Vec<u32>) {
         let wanted = self.wanted(inside);
         // pieces of yarns with at least one segment
         let mut pieces: Vec<(usize, std::ops::Range<usize>)> = Vec::new();
@@ -95,7 +96,7 @@ impl YarnMesh {
             part.stack_starts.push(part.stacks.len() as u32);
         }
         part.take_contacts(self, &ids, &passages);
-        (part, nodes)
+        (part, nodes, passages)
     }
 
     /// Nodes that are inside or in an energy with one that is.

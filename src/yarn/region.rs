@@ -5,8 +5,9 @@
 //! to side and within 10 micrometres of the curve; its corners lie at equal steps of arc length, so that a
 //! point of it has a fraction of its edge.
 
+use super::layout::Cell;
 use crate::error::Result;
-use crate::math::Vec2;
+use crate::math::{Mat2, Vec2};
 use crate::pattern::Panel;
 use std::f64::consts::PI;
 
@@ -113,6 +114,12 @@ impl Region {
     /// A point of the frame in the panel's coordinates.
     pub(super) fn to_panel(&self, p: Vec2) -> Vec2 {
         self.axes[0] * p.x + self.axes[1] * p.y
+    }
+
+    /// From a step on the panel to the one in the nominal layout of a fabric laid by a cell, as long as the yarn.
+    pub(super) fn nominal(&self, cell: &Cell) -> Mat2 {
+        let size = Vec2::new(cell.rest / cell.across, cell.rest / cell.along);
+        Mat2::from_diagonal(&size) * Mat2::from_columns(&self.axes).transpose()
     }
 
     /// A point of the panel in the frame.

@@ -80,7 +80,7 @@ fn rod(
         }
     }
     for k in 0..=pieces as u32 {
-        builder.pass(first + k, Place::default(), 1.0);
+        builder.pass(first + k, Place::default());
     }
     builder.end_yarn(fabric as u32, Family::Seam);
     for (k, side) in sides.iter().enumerate() {

@@ -80,7 +80,7 @@ pub(super) fn lay(
                 edge: rim.edge,
                 fraction: rim.fraction,
             });
-            builder.pass(node, Default::default(), cell.rest);
+            builder.pass(node, Default::default());
         };
         let first = builder.yarn_start();
         let from = strands.len();
@@ -95,7 +95,7 @@ pub(super) fn lay(
                 let lift = LIFT * w * noise(panel, passage.node);
                 ids[old] = builder.node(panel, region.to_panel(path.points[old] + origin), lift);
             }
-            let incidence = builder.pass(ids[old], passage.place, cell.rest);
+            let incidence = builder.pass(ids[old], passage.place);
             if let Some((last, at)) = before {
                 let contact = |node: u32| (node as usize) < path.contact_nodes;
                 if contact(last.node) && contact(passage.node) {

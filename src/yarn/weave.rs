@@ -233,7 +233,7 @@ pub(super) fn lay(
                 rank: u8::from(front == Some(true)),
                 group: u8::from(weft),
             };
-            let incidence = builder.pass(node, place, cell.rest);
+            let incidence = builder.pass(node, place);
             if let Some((before, old)) = last {
                 if let Some(slot) = beside.get_mut(node as usize - first_node) {
                     slot[usize::from(weft)][0] = before;
@@ -252,7 +252,7 @@ pub(super) fn lay(
         }
         builder.end_yarn(fabric, if weft { Family::Weft } else { Family::Warp });
     }
-    let pitch = 0.5 * cell.rest * (lines[0].pitch + lines[1].pitch);
+    let pitch = 0.5 * cell.rest * (weave.warp_pitch + weave.weft_pitch);
     for (k, [warp, weft]) in beside.iter().enumerate() {
         for a in warp {
             for b in weft {

@@ -47,6 +47,8 @@ pub(crate) enum Command {
         #[arg(long, value_name = "SVG")]
         out: PathBuf,
     },
+    /// Tests a periodic cell of a fabric of yarns: its size at rest, and the material of triangles that is like it.
+    Fabric(FabricArgs),
     /// Drapes a scene with blend regions by several models and compares them: error against time.
     Report {
         #[command(flatten)]
@@ -96,6 +98,28 @@ pub(crate) struct SceneArgs {
     /// Sets a number by dotted name; `toile schema` lists the names.
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = assignment)]
     pub(crate) set: Vec<(String, f64)>,
+}
+
+/// What to test.
+#[derive(Args)]
+pub(crate) struct FabricArgs {
+    /// Fabric file (JSON) with yarns.
+    pub(crate) fabric: PathBuf,
+    /// Folder for fabric.json, the fabric with the material found, and plots; made if it is not there.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Largest Green strain along the yarns; by default 0.01 for a weave, 0.1 for a knit.
+    #[arg(long, value_name = "STRAIN")]
+    pub(crate) stretch: Option<f64>,
+    /// Largest shear strain, by default 0.1.
+    #[arg(long, value_name = "STRAIN")]
+    pub(crate) shear: Option<f64>,
+    /// Largest curvature [1/m], by default 0.15 over the pitch.
+    #[arg(long, value_name = "1/M")]
+    pub(crate) curvature: Option<f64>,
+    /// Steps to the largest of each, by default 4.
+    #[arg(long, value_name = "N")]
+    pub(crate) steps: Option<usize>,
 }
 
 /// How to run.

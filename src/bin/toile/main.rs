@@ -5,6 +5,7 @@
 //! written. A drape that stops at its iteration limit ends with 0 and says so in `outcome`.
 
 mod args;
+mod fabric;
 mod fmu;
 mod info;
 mod output;
@@ -42,6 +43,7 @@ fn main() -> ExitCode {
         }
         Command::Mannequin { out, cell } => info::mannequin(out, *cell),
         Command::Yarns { scene, out } => yarns::yarns(scene, out),
+        Command::Fabric(args) => fabric::fabric(args),
         Command::Report { scene, out } => report::report(scene, out),
         Command::Picture {
             garment,

@@ -6,7 +6,9 @@ use crate::output::{Done, Failure, file, out};
 use std::fmt::Write;
 use std::path::Path;
 use toile::error::Error;
+use toile::fabric::rest::cells;
 use toile::readout::flat_yarns::flat_yarns_svg;
+use toile::solve::settings::Settings;
 use toile::yarn::{Layout, lay};
 
 pub(crate) fn yarns(args: &SceneArgs, svg: &Path) -> Done {
@@ -17,7 +19,12 @@ pub(crate) fn yarns(args: &SceneArgs, svg: &Path) -> Done {
             garment.name
         ))));
     }
-    let mesh = lay(&garment, &Layout::default())?;
+    let cells = cells(&garment, |_| true, &Settings::default())?;
+    let layout = Layout {
+        cells: &cells,
+        ..Layout::default()
+    };
+    let mesh = lay(&garment, &layout)?;
     let counts = mesh.counts();
     let mut text = String::new();
     for (name, value) in [

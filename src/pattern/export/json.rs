@@ -176,6 +176,9 @@ fn yarns_value(yarns: &YarnFabric) -> Result<Value> {
             "stiffness": number(yarns.damping_stiffness)?,
         }),
     );
+    if yarns.compensated {
+        value.insert("compensated".into(), json!(true));
+    }
     Ok(Value::Object(value))
 }
 

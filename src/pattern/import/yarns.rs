@@ -144,6 +144,13 @@ pub const YARNS: &[Key] = &[
         "see there",
         "Rayleigh damping of the yarns: mass 2, stiffness 0.01",
     ),
+    key(
+        "compensated",
+        "boolean",
+        "",
+        "false",
+        "whether yarns are laid at the distances that they have when the fabric is at rest",
+    ),
 ];
 
 /// Reads a fabric's yarns; `Fabric::check` judges the numbers.
@@ -189,6 +196,7 @@ pub(super) fn read_yarns(node: &Node<'_>) -> Result<YarnFabric> {
         yarns.damping_mass = damping.number_or("mass", yarns.damping_mass)?;
         yarns.damping_stiffness = damping.number_or("stiffness", yarns.damping_stiffness)?;
     }
+    yarns.compensated = object.boolean_or("compensated", yarns.compensated)?;
     Ok(yarns)
 }
 

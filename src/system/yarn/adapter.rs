@@ -13,6 +13,7 @@ use super::kernel::{Kernel, Local, MAX_POSITIONS, MAX_SLIDES};
 use super::unknowns::Unknowns;
 use crate::math::{Mat3, Vec3};
 use crate::yarn::YarnMesh;
+use std::sync::Arc;
 
 /// Place of a scalar that is no unknown.
 const FROZEN: u8 = u8::MAX;
@@ -41,6 +42,8 @@ pub struct YarnTerm<K, const N: usize> {
     arity: usize,
     blocks: Vec<u32>,
     elements: Vec<Element<K, N>>,
+    /// Distances of images' coordinates from their own, by incidence; empty without images.
+    shifts: Arc<[Option<f64>]>,
 }
 
 /// Terms of all stencils, one for each number of blocks that occurs.
@@ -54,6 +57,7 @@ pub(super) fn terms<K: Kernel<N> + 'static, const N: usize>(
             arity,
             blocks: Vec::new(),
             elements: Vec::new(),
+            shifts: unknowns.shifts.clone(),
         })
         .collect();
     for stencil in stencils {
@@ -80,12 +84,16 @@ pub(super) fn terms<K: Kernel<N> + 'static, const N: usize>(
                 place[k] = 3 * local(block) + component;
             }
         }
-        let weight = if K::POSITIONS > 0 {
-            mesh.weight(&stencil.nodes[..K::POSITIONS])
+        let on = stencil.incidences.map(|i| mesh.incidences[i as usize].node);
+        let nodes = if K::POSITIONS > 0 {
+            &stencil.nodes[..K::POSITIONS]
         } else {
-            let nodes = stencil.incidences.map(|i| mesh.incidences[i as usize].node);
-            mesh.weight(&nodes[..N])
+            &on[..N]
         };
+        if !mesh.reaches(nodes) {
+            continue;
+        }
+        let weight = mesh.weight(nodes);
         let group = &mut groups[arity];
         group.blocks.extend_from_slice(&blocks[..arity]);
         group.elements.push(Element {
@@ -120,7 +128,10 @@ impl<K: Kernel<N>, const N: usize> YarnTerm<K, N> {
             q[k] = if place == FROZEN {
                 u[element.incidences[k - 3 * K::POSITIONS] as usize]
             } else {
-                from[blocks[usize::from(place / 3)] as usize][usize::from(place % 3)]
+                let incidence = element.incidences[k - 3 * K::POSITIONS] as usize;
+                let shift = self.shifts.get(incidence).copied().flatten();
+                let own = from[blocks[usize::from(place / 3)] as usize][usize::from(place % 3)];
+                shift.map_or(own, |shift| own + shift)
             };
         }
         q
@@ -223,7 +234,8 @@ impl<K: Kernel<N>, const N: usize> Term for YarnTerm<K, N> {
                 } else {
                     slot[(b, a)] += h[k][l];
                 }
-                if i == j && a != b {
+                // a coordinate that is in the stencil twice, itself and its image, has both halves
+                if i == j && (a != b || k != l) {
                     slot[(b, a)] += h[k][l];
                 }
             }

@@ -67,6 +67,8 @@ pub struct Compression {
     stack_starts: Vec<u32>,
     stacks: Vec<Strand>,
     turns: Vec<Option<Turn>>,
+    /// Nodes that are images of others in a periodic cell, which have only some of their neighbours.
+    images: Vec<[u32; 2]>,
     wraps: Vec<WrapLoad>,
     stitches: Vec<([u32; 2], StitchLength)>,
     spacings: Vec<([u32; 2], Spacing)>,
@@ -147,11 +149,15 @@ impl Compression {
                 kernel: s.kernel,
             })
             .collect();
+        let node = |i: u32| mesh.incidences[i as usize].node;
+        let images = mesh.images.iter().map(|i| [node(i.incidence), node(i.of)]);
+        let images = images.collect();
         let n = passages.len();
         Ok(Self {
             stack_starts: mesh.stack_starts.clone(),
             stacks: mesh.stacks.clone(),
             turns,
+            images,
             wrap_loads: vec![[[Vec3::zeros(); 3]; 2]; wraps.len()],
             wraps,
             stitches: springs::stitches(mesh, materials)?
@@ -184,6 +190,9 @@ impl Compression {
                 *normal = self.normal(c * CHUNK + k, at.x, normal);
             }
         });
+        for [image, of] in &self.images {
+            normals[*image as usize] = normals[*of as usize];
+        }
         let mut loads = std::mem::take(&mut self.loads);
         workers.chunks(&mut loads, CHUNK, |c, chunk| {
             for (k, load) in chunk.iter_mut().enumerate() {

@@ -6,9 +6,10 @@
 
 use crate::error::{Error, Result};
 use crate::yarn::YarnMesh;
+use std::sync::Arc;
 
 /// Blocks of the nodes and of the coordinates that slide now.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Unknowns {
     /// Block of node 0.
     pub first_node: u32,
@@ -16,6 +17,9 @@ pub struct Unknowns {
     pub first_slide: u32,
     /// Per incidence: block and component of its coordinate, none where it does not slide now.
     pub slides: Vec<Option<(u32, u8)>>,
+    /// Per incidence of a periodic cell: how far its coordinate is from the one whose image it is [m]; empty
+    /// without images.
+    pub shifts: Arc<[Option<f64>]>,
     /// Node of each sliding block.
     pub owners: Vec<u32>,
     /// Components in use of each sliding block, 1 to 3, the first ones.
@@ -41,6 +45,7 @@ impl Unknowns {
             first_node,
             first_slide,
             slides: vec![None; sliding.len()],
+            shifts: Arc::default(),
             owners: Vec::new(),
             used: Vec::new(),
         };
@@ -70,7 +75,21 @@ impl Unknowns {
                 )));
             }
         }
+        if !mesh.images.is_empty() {
+            let mut shifts = vec![None; sliding.len()];
+            for image in &mesh.images {
+                let [i, of] = [image.incidence, image.of].map(|i| i as usize);
+                out.slides[i] = out.slides[of];
+                shifts[i] = Some(mesh.incidences[i].u - mesh.incidences[of].u);
+            }
+            out.shifts = shifts.into();
+        }
         Ok(out)
+    }
+
+    /// How far a coordinate is from the one whose image it is, if it is one [m].
+    pub fn shift(&self, incidence: usize) -> Option<f64> {
+        self.shifts.get(incidence).copied().flatten()
     }
 
     /// Number of sliding blocks.

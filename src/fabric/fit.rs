@@ -1,0 +1,338 @@
+//! The triangles' material of a fabric, fitted to its yarns by tests on the periodic cell.
+//!
+//! The cell is brought to rest ([`rest`](super::rest)); from there it is stretched across, along, both ways, sheared, and both
+//! at once, in steps, with the contacts held where they slid to, so that there is one energy of the strain. With the Green
+//! strain `E` against the size at rest and `W` per area at rest, less that at rest,
+//!
+//! ```text
+//! W ~ 1/2 (weft E11^2 + 2 coupling E11 E22 + warp E22^2 + shear (2 E12)^2)
+//! W ~ M kappa + 1/2 B kappa^2 = 1/2 B (kappa - kappa0)^2 - const,   kappa0 = -M/B
+//! ```
+//!
+//! by least squares of the errors over `W`, so that small strains count like large ones. In bending tests the width across is
+//! that at rest and the length is free. What the fit leaves is told as an error of energy. SI units.
+
+use super::cell::PeriodicCell;
+use super::rest::{Rest, rest, sized};
+use crate::error::{Error, Result};
+use crate::pattern::Fabric;
+use crate::pattern::yarn_fabric::{Structure, YarnFabric};
+use crate::solve::settings::Settings;
+use nalgebra::{Matrix2, Matrix3x2, Matrix4, Vector2, Vector3, Vector4};
+
+/// Force to which nodes come to rest in the tests [N].
+const FORCE: f64 = 1e-9;
+/// Least weight of an energy, over the largest.
+const LEAST: f64 = 1e-6;
+/// Least stiffness of a fit over its largest: a material must be positive definite.
+const FLOOR: f64 = 1e-4;
+
+/// Largest strains and curvatures of the tests, and how many steps lead there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Range {
+    /// Green strain `E11`, `E22`.
+    pub stretch: f64,
+    /// Shear strain `2 E12`.
+    pub shear: f64,
+    /// Curvature [1/m].
+    pub curvature: f64,
+    /// Steps.
+    pub steps: usize,
+}
+
+impl Range {
+    /// What suits a fabric: yarns of a weave are stretched at once, loops of a knit give way first.
+    pub fn of(fabric: &YarnFabric) -> Self {
+        let [a, b] = fabric.structure.pitch();
+        let stretch = match fabric.structure {
+            Structure::Woven(_) => 0.01,
+            Structure::Knitted(_) => 0.1,
+        };
+        Self {
+            stretch,
+            shear: 0.1,
+            curvature: 0.15 / a.max(b),
+            steps: 4,
+        }
+    }
+}
+
+/// A test: strains grow along a direction.
+pub const TESTS: [(&str, [f64; 3]); 8] = [
+    ("weft", [1.0, 0.0, 0.0]),
+    ("warp", [0.0, 1.0, 0.0]),
+    ("both", [1.0, 1.0, 0.0]),
+    ("weft, half warp", [1.0, 0.5, 0.0]),
+    ("shear", [0.0, 0.0, 1.0]),
+    ("shear back", [0.0, 0.0, -1.0]),
+    ("weft and shear", [1.0, 0.0, 1.0]),
+    ("warp and shear", [0.0, 1.0, 1.0]),
+];
+
+/// The cell at one strain.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// Number of the test in [`TESTS`].
+    pub test: usize,
+    /// `(E11, E22, 2 E12)`.
+    pub strain: Vector3<f64>,
+    /// `W` [J/m^2].
+    pub energy: f64,
+    /// Second Piola-Kirchhoff stress `(S11, S22, S12)`, less that at rest [N/m].
+    pub stress: Vector3<f64>,
+}
+
+/// The cell at one curvature.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BentSample {
+    /// Which direction is curved: 0 weft, 1 warp.
+    pub axis: usize,
+    /// Curvature, positive to the front [1/m].
+    pub curvature: f64,
+    /// `W` [J/m^2].
+    pub energy: f64,
+}
+
+/// Bending of one direction.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Bending {
+    /// `B` [N m].
+    pub rigidity: f64,
+    /// `M`, the moment per width of the flat fabric [N].
+    pub moment: f64,
+    /// Largest error of the energy over the largest energy.
+    pub error: f64,
+}
+
+impl Bending {
+    /// Curvature at rest, positive to the front [1/m].
+    pub fn rest(&self) -> f64 {
+        -self.moment / self.rigidity
+    }
+}
+
+/// What the tests of a fabric came to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fit {
+    /// Size at rest.
+    pub rest: Rest,
+    /// Mass per area at rest [kg/m^2].
+    pub density: f64,
+    /// Tests of the membrane.
+    pub samples: Vec<Sample>,
+    /// Tests of bending.
+    pub bent: Vec<BentSample>,
+    /// `(weft, coupling, warp, shear)` [N/m].
+    pub membrane: [f64; 4],
+    /// Root mean square and largest error of the membrane's energy, each over the yarns'.
+    pub errors: [f64; 2],
+    /// Bending that curves the weft, the warp.
+    pub bending: [Bending; 2],
+    /// Corrections of everything inside that all tests took.
+    pub corrections: u64,
+}
+
+/// `W` of the material `(weft, coupling, warp, shear)` [J/m^2].
+pub fn energy(membrane: &[f64; 4], strain: &Vector3<f64>) -> f64 {
+    basis(strain).dot(&Vector4::from(*membrane))
+}
+
+fn basis(e: &Vector3<f64>) -> Vector4<f64> {
+    Vector4::new(0.5 * e.x * e.x, e.x * e.y, 0.5 * e.y * e.y, 0.5 * e.z * e.z)
+}
+
+/// Fits a fabric's material.
+pub fn fit(fabric: &YarnFabric, range: &Range, settings: &Settings) -> Result<Fit> {
+    for (name, value, most) in [
+        ("stretch", range.stretch, 1.0),
+        ("shear", range.shear, 1.0),
+        ("curvature", range.curvature, 1e5),
+    ] {
+        if !(value > 0.0 && value <= most) {
+            return Err(Error::argument(format!(
+                "{name} of the tests = {value} must lie in (0, {most}]"
+            )));
+        }
+    }
+    if !(1..=1000).contains(&range.steps) {
+        return Err(Error::argument(format!(
+            "{} steps of the tests, must be 1 to 1000",
+            range.steps
+        )));
+    }
+    let mut cell = PeriodicCell::new(fabric, [1, 1], settings)?;
+    let at_rest = rest(&mut cell)?;
+    let mut corrections = at_rest.corrections + cell.relax(FORCE)?;
+    let area: f64 = at_rest.factors.iter().product();
+    let start = (cell.energy()?, second(&mut cell, at_rest.factors)?);
+    let kept = cell.checkpoint();
+    let mut samples = Vec::with_capacity(TESTS.len() * range.steps);
+    for (test, (name, direction)) in TESTS.iter().enumerate() {
+        cell.roll_back(kept.clone());
+        for step in 1..=range.steps {
+            let part = step as f64 / range.steps as f64;
+            let strain = Vector3::new(
+                direction[0] * range.stretch,
+                direction[1] * range.stretch,
+                direction[2] * range.shear,
+            ) * part;
+            cell.stretch(&strained(at_rest.factors, &strain));
+            corrections += cell
+                .relax(FORCE)
+                .map_err(|e| e.at(format!("{name}, strain {:?}", strain.as_slice())))?;
+            samples.push(Sample {
+                test,
+                strain,
+                energy: (cell.energy()? - start.0) / area,
+                stress: second(&mut cell, at_rest.factors)? - start.1,
+            });
+        }
+    }
+    cell.roll_back(kept);
+    let mut bent = Vec::with_capacity(4 * range.steps);
+    for axis in [0, 1] {
+        for side in [-1.0, 1.0] {
+            for step in 1..=range.steps {
+                let curvature = side * range.curvature * step as f64 / range.steps as f64;
+                let mut test = cell.bent(axis, curvature)?;
+                corrections += test
+                    .relax(FORCE)
+                    .map_err(|e| e.at(format!("curvature {curvature} 1/m")))?;
+                bent.push(BentSample {
+                    axis,
+                    curvature,
+                    energy: (test.energy()? - start.0) / area,
+                });
+            }
+        }
+    }
+    let membrane = membrane(&samples)?;
+    let errors = errors(&samples, |e| energy(&membrane, e));
+    Ok(Fit {
+        rest: at_rest,
+        density: cell.density() / area,
+        membrane,
+        errors,
+        bending: [0, 1].map(|axis| bending(&bent, axis)),
+        samples,
+        bent,
+        corrections,
+    })
+}
+
+/// A gradient from the flat layout with this Green strain against the size at rest.
+fn strained(factors: [f64; 2], e: &Vector3<f64>) -> Matrix3x2<f64> {
+    let c = Vector3::new(1.0 + 2.0 * e.x, 1.0 + 2.0 * e.y, e.z);
+    let first = c.x.sqrt();
+    let side = c.z / first;
+    let f = Matrix3x2::new(first, side, 0.0, (c.y - side * side).sqrt(), 0.0, 0.0);
+    f * sized(factors).fixed_rows::<2>(0)
+}
+
+/// Second Piola-Kirchhoff stress against the size at rest.
+fn second(cell: &mut PeriodicCell, factors: [f64; 2]) -> Result<Vector3<f64>> {
+    let size = Matrix2::from_diagonal(&Vector2::from(factors));
+    let area = size.determinant();
+    let stress = cell.stress()? * size / area;
+    let f = cell.gradient() * Matrix2::from_diagonal(&Vector2::from(factors.map(f64::recip)));
+    let c = f.transpose() * f;
+    let inverse = c.try_inverse().ok_or_else(|| {
+        Error::material("the cell of the fabric has lost its area under a test".to_owned())
+    })?;
+    let s = inverse * f.transpose() * stress;
+    Ok(Vector3::new(
+        s[(0, 0)],
+        s[(1, 1)],
+        0.5 * (s[(0, 1)] + s[(1, 0)]),
+    ))
+}
+
+/// Weights of least squares: one over each energy.
+fn weights(energies: impl Iterator<Item = f64> + Clone) -> Vec<f64> {
+    let largest = energies.clone().map(f64::abs).fold(0.0, f64::max);
+    energies
+        .map(|w| 1.0 / w.abs().max(LEAST * largest))
+        .collect()
+}
+
+fn membrane(samples: &[Sample]) -> Result<[f64; 4]> {
+    let (mut a, mut b) = (Matrix4::zeros(), Vector4::zeros());
+    let weights = weights(samples.iter().map(|s| s.energy));
+    for (sample, weight) in samples.iter().zip(weights) {
+        let row = basis(&sample.strain) * weight;
+        a += row * row.transpose();
+        b += row * (sample.energy * weight);
+    }
+    // unknowns of one size
+    let scale = a.diagonal().map(|d| 1.0 / d.sqrt());
+    let scaled = Matrix4::from_diagonal(&scale) * a * Matrix4::from_diagonal(&scale);
+    let solution = scaled
+        .cholesky()
+        .ok_or_else(|| {
+            Error::material("the tests do not tell the membrane's stiffness".to_owned())
+        })?
+        .solve(&b.component_mul(&scale))
+        .component_mul(&scale);
+    let [mut weft, mut coupling, mut warp, mut shear] = <[f64; 4]>::from(solution);
+    let least = FLOOR * weft.abs().max(warp.abs());
+    weft = weft.max(least);
+    warp = warp.max(least);
+    shear = shear.max(least);
+    let most = (1.0 - FLOOR) * (weft * warp).sqrt();
+    coupling = coupling.clamp(-most, most);
+    Ok([weft, coupling, warp, shear])
+}
+
+/// Root mean square and largest of the errors of a material's energy, each over the yarns'.
+pub fn errors(samples: &[Sample], material: impl Fn(&Vector3<f64>) -> f64) -> [f64; 2] {
+    let weights = weights(samples.iter().map(|s| s.energy));
+    let (mut sum, mut largest) = (0.0, 0.0_f64);
+    for (sample, weight) in samples.iter().zip(weights) {
+        let error = (material(&sample.strain) - sample.energy) * weight;
+        sum += error * error;
+        largest = largest.max(error.abs());
+    }
+    [(sum / samples.len() as f64).sqrt(), largest]
+}
+
+fn bending(samples: &[BentSample], axis: usize) -> Bending {
+    let own = || samples.iter().filter(|s| s.axis == axis);
+    let (mut a, mut b) = (Matrix2::zeros(), Vector2::zeros());
+    let size = own().map(|s| s.curvature.abs()).fold(0.0, f64::max);
+    let row = |s: &BentSample| {
+        let k = s.curvature / size;
+        Vector2::new(k, 0.5 * k * k)
+    };
+    for sample in own() {
+        let row = row(sample);
+        a += row * row.transpose();
+        b += row * sample.energy;
+    }
+    let solution = a.try_inverse().map_or_else(Vector2::zeros, |i| i * b);
+    let largest = own().map(|s| s.energy.abs()).fold(0.0, f64::max);
+    let error = own()
+        .map(|s| (row(s).dot(&solution) - s.energy).abs())
+        .fold(0.0, f64::max);
+    Bending {
+        rigidity: (solution.y / (size * size)).max(0.0),
+        moment: solution.x / size,
+        error: error / largest,
+    }
+}
+
+impl Fit {
+    /// A fabric with this material, everything else as it was.
+    pub fn fabric(&self, like: &Fabric) -> Fabric {
+        let [weft, coupling, warp, shear] = self.membrane;
+        Fabric {
+            density: self.density,
+            weft,
+            coupling,
+            warp,
+            shear,
+            bending_weft: self.bending[0].rigidity,
+            bending_warp: self.bending[1].rigidity,
+            ..like.clone()
+        }
+    }
+}

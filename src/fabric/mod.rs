@@ -1,0 +1,7 @@
+//! What a fabric of yarns is as a whole: its periodic cell, how it lies at rest, the triangles' material that is like it.
+
+pub mod cell;
+pub mod fit;
+pub mod rest;
+
+pub use cell::PeriodicCell;
