@@ -139,6 +139,8 @@ mod yarn_laws;
 mod yarn_robust;
 #[path = "yarn_sims.rs"]
 mod yarn_sims;
+#[path = "yarn_single.rs"]
+mod yarn_single;
 #[path = "yarn_stretch.rs"]
 mod yarn_stretch;
 #[path = "yarn_terms_fd.rs"]
