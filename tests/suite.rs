@@ -133,6 +133,8 @@ mod yarn_friction;
 mod yarn_garments;
 #[path = "yarn_knit.rs"]
 mod yarn_knit;
+#[path = "yarn_lace.rs"]
+mod yarn_lace;
 #[path = "yarn_laws.rs"]
 mod yarn_laws;
 #[path = "yarn_robust.rs"]
