@@ -135,12 +135,16 @@ mod yarn_friction;
 mod yarn_garments;
 #[path = "yarn_knit.rs"]
 mod yarn_knit;
+#[path = "yarn_lace.rs"]
+mod yarn_lace;
 #[path = "yarn_laws.rs"]
 mod yarn_laws;
 #[path = "yarn_robust.rs"]
 mod yarn_robust;
 #[path = "yarn_sims.rs"]
 mod yarn_sims;
+#[path = "yarn_single.rs"]
+mod yarn_single;
 #[path = "yarn_stretch.rs"]
 mod yarn_stretch;
 #[path = "yarn_terms_fd.rs"]

@@ -118,3 +118,17 @@ fn an_overstretched_knit_keeps_a_set_that_grows() {
     }
     assert!(sets.windows(2).all(|w| w[1] > w[0] + 0.005), "{sets:?}");
 }
+
+/// Jersey stretched by 1 % and let back pulls as before where friction holds its yarn, and less where it slid.
+#[test]
+fn a_knit_stretched_below_slip_keeps_no_set() {
+    let lost = [20.0, 0.3].map(|friction| {
+        let keys = format!("\"knit\": \"stockinette\", \"friction\": {friction}");
+        let mut jersey = Swatch::knit(&keys, 6, 6, 0);
+        let read = curve(&mut jersey, &[1.0, 1.01, 1.0]);
+        1.0 - read[2].force / read[0].force
+    });
+    println!("jersey: lost {lost:.6?} of its load");
+    assert!(lost[0].abs() < 1e-3, "{lost:?}");
+    assert!(lost[1] > 1e-2, "{lost:?}");
+}
