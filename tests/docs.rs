@@ -3,11 +3,13 @@
 
 use std::path::Path;
 
-const PAGES: [&str; 7] = [
+const PAGES: [&str; 9] = [
     "README.md",
     "ARCHITECTURE.md",
     "CONTRIBUTING.md",
     "CHANGELOG.md",
+    "docs/benchmarks.md",
+    "docs/fabric.md",
     "docs/fmi.md",
     "docs/mixed.md",
     "docs/yarns.md",
