@@ -258,6 +258,32 @@ fn tests_that_cannot_be_are_refused() {
         .err()
         .unwrap();
     assert!(error.message.contains("repeat"), "{}", error.message);
+    // the wrapping of so rough yarns is no bending that a rigidity could tell
+    let rough = YarnFabric {
+        friction: 10.0,
+        ..yarns
+    };
+    let error = fit(&rough, &usual, &numbers).err().unwrap();
+    assert!(error.message.contains("bending"), "{}", error.message);
+}
+
+/// A chart that repeats in itself is as small a cell as its repeat.
+#[test]
+fn a_chart_is_cut_down_to_its_repeat() {
+    let repeat = |rows: &[&str]| {
+        let rows: Vec<String> = rows.iter().map(|row| format!("\"{row}\"")).collect();
+        let text = format!(
+            r#"{{"yarns": {{"chart": [{}], "loop_width": 0.004, "radius": 0.001}}}}"#,
+            rows.join(", ")
+        );
+        let (fabric, _) = fabric_from_json(&text).unwrap();
+        fabric.yarns.unwrap().structure.repeat()
+    };
+    assert_eq!(repeat(&["........"; 8]), [1, 1]);
+    assert_eq!(repeat(&["..--..--", "..--..--"]), [4, 1]);
+    assert_eq!(repeat(&[".-.-", "-.-.", ".-.-", "-.-."]), [2, 2]);
+    assert_eq!(repeat(&[".", "-"]), [1, 2]);
+    assert_eq!(repeat(&[".-."]), [3, 1]);
 }
 
 /// Area at rest over the laid one: of the parallelograms from each contact to those two loops across and two courses on.

@@ -138,7 +138,8 @@ impl PeriodicCell {
         &self.yarns
     }
 
-    /// Distances as laid and now of two nodes that were laid a pitch apart or more and are now nearer than yarns are thick [m].
+    /// Distances as laid and now of two nodes that were laid a pitch apart or more and are now nearer than yarns are thick
+    /// (by more than a thousandth) [m].
     pub(super) fn touching(&self) -> Option<[f64; 2]> {
         let mesh = &self.yarns.mesh;
         let radius = self.yarns.materials.first().map_or(0.0, |m| m.radius);
@@ -146,7 +147,7 @@ impl PeriodicCell {
         let own = (0..x.len()).filter(|n| mesh.is_inside(*n as u32));
         own.flat_map(|a| (0..x.len()).map(move |b| (a, b)))
             .map(|(a, b)| [(mesh.uv[a] - mesh.uv[b]).norm(), (x[a] - x[b]).norm()])
-            .find(|[laid, now]| *laid >= self.apart && *now < 2.0 * radius)
+            .find(|[laid, now]| *laid >= self.apart && *now < 1.998 * radius)
     }
 
     /// Positions of the yarns' nodes [m].

@@ -143,14 +143,15 @@ fn basis(e: &Vector3<f64>) -> Vector4<f64> {
 
 /// Fits a fabric's material.
 pub fn fit(fabric: &YarnFabric, range: &Range, settings: &Settings) -> Result<Fit> {
-    for (name, value, most) in [
-        ("stretch", range.stretch, 1.0),
-        ("shear", range.shear, 1.0),
-        ("curvature", range.curvature, 1e5),
+    // smaller ones would measure the force to which the cell comes to rest
+    for (name, value, least, most) in [
+        ("stretch", range.stretch, 1e-4, 1.0),
+        ("shear", range.shear, 1e-4, 1.0),
+        ("curvature", range.curvature, 1e-2, 1e5),
     ] {
-        if !(value > 0.0 && value <= most) {
+        if !(least..=most).contains(&value) {
             return Err(Error::argument(format!(
-                "{name} of the tests = {value} must lie in (0, {most}]"
+                "{name} of the tests = {value} must lie in [{least}, {most}]"
             )));
         }
     }
@@ -213,7 +214,7 @@ pub fn fit(fabric: &YarnFabric, range: &Range, settings: &Settings) -> Result<Fi
         density: cell.density() / area,
         membrane,
         errors,
-        bending: [0, 1].map(|axis| bending(&bent, axis)),
+        bending: [bending(&bent, 0)?, bending(&bent, 1)?],
         samples,
         bent,
         corrections,
@@ -295,7 +296,7 @@ pub fn errors(samples: &[Sample], material: impl Fn(&Vector3<f64>) -> f64) -> [f
     [(sum / samples.len() as f64).sqrt(), largest]
 }
 
-fn bending(samples: &[BentSample], axis: usize) -> Bending {
+fn bending(samples: &[BentSample], axis: usize) -> Result<Bending> {
     let own = || samples.iter().filter(|s| s.axis == axis);
     let (mut a, mut b) = (Matrix2::zeros(), Vector2::zeros());
     let size = own().map(|s| s.curvature.abs()).fold(0.0, f64::max);
@@ -313,11 +314,18 @@ fn bending(samples: &[BentSample], axis: usize) -> Bending {
     let error = own()
         .map(|s| (row(s).dot(&solution) - s.energy).abs())
         .fold(0.0, f64::max);
-    Bending {
-        rigidity: (solution.y / (size * size)).max(0.0),
+    let rigidity = solution.y / (size * size);
+    if !(rigidity > 0.0 && rigidity.is_finite()) {
+        return Err(Error::material(format!(
+            "the tests do not tell the bending of the {}: its energy over curvatures to {size} 1/m bends downwards, as if its rigidity were {rigidity:.1e} N m",
+            ["weft", "warp"][axis]
+        )));
+    }
+    Ok(Bending {
+        rigidity,
         moment: solution.x / size,
         error: error / largest,
-    }
+    })
 }
 
 impl Fit {

@@ -133,7 +133,8 @@ pub fn rest(cell: &mut PeriodicCell) -> Result<Rest> {
         }
     }
     Err(Error::material(format!(
-        "the fabric finds no size: {factors:?} of the laid one after {ROUNDS} corrections"
+        "the fabric finds no size at rest: {:.4} of its width and {:.4} of its height as laid after {ROUNDS} corrections",
+        factors.x, factors.y
     )))
 }
 

@@ -211,17 +211,42 @@ impl Structure {
         }
     }
 
-    /// Yarns or loops across, wefts or courses along, after which the fabric repeats.
+    /// Yarns or loops across, wefts or courses along, after which the fabric repeats; of a knit the fewest.
     pub fn repeat(&self) -> [usize; 2] {
         match self {
             Self::Woven(weave) => weave.mask.size(),
             Self::Knitted(knit) => {
                 let rows = knit.chart.resolved(true);
                 let loops = |row: &Vec<_>| row.iter().map(Stitch::makes).sum::<usize>();
-                [rows.iter().map(loops).max().unwrap_or(1), rows.len()]
+                let across = if knit.chart.is_plain() {
+                    // rows may be of several lengths: each has its own period
+                    let periods = rows.iter().map(|row| period(row));
+                    periods.fold(1, |all, p| all / common(all, p) * p)
+                } else {
+                    rows.iter().map(loops).max().unwrap_or(1)
+                };
+                [across, period(&rows)]
             }
         }
     }
+}
+
+/// Fewest items after which a list goes on as it began.
+fn period<T: PartialEq>(items: &[T]) -> usize {
+    let n = items.len();
+    let repeats = |p: &usize| {
+        n.is_multiple_of(*p)
+            && items[*p..]
+                .iter()
+                .zip(items)
+                .all(|(item, first)| item == first)
+    };
+    (1..=n).find(repeats).unwrap_or(1)
+}
+
+/// Greatest common divisor (Euclid).
+fn common(a: usize, b: usize) -> usize {
+    if b == 0 { a } else { common(b, a % b) }
 }
 
 impl YarnFabric {

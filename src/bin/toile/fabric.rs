@@ -11,6 +11,8 @@ use toile::pattern::import::fabric_from_json;
 use toile::readout::plot::{Curve, Plot};
 use toile::solve::settings::Settings;
 
+/// Error of the energy, root mean square, from which a fit is called poor.
+const POOR: f64 = 0.1;
 /// Points of a drawn curve.
 const POINTS: usize = 60;
 
@@ -19,12 +21,13 @@ pub(crate) fn fabric(args: &FabricArgs) -> Done {
         code: 1,
         text: format!("cannot read {}: {e}", args.fabric.display()),
     })?;
-    let (fabric, _) = fabric_from_json(&text)?;
+    let named = |e: Error| e.at(args.fabric.display());
+    let (fabric, _) = fabric_from_json(&text).map_err(named)?;
     let Some(yarns) = &fabric.yarns else {
-        return Err(Failure::from(Error::material(format!(
+        return Err(Failure::from(named(Error::material(format!(
             "fabric '{}' has no yarns",
             fabric.name
-        ))));
+        )))));
     };
     let usual = Range::of(yarns);
     let range = Range {
@@ -33,7 +36,7 @@ pub(crate) fn fabric(args: &FabricArgs) -> Done {
         curvature: args.curvature.unwrap_or(usual.curvature),
         steps: args.steps.unwrap_or(usual.steps),
     };
-    let found = fit(yarns, &range, &Settings::default())?;
+    let found = fit(yarns, &range, &Settings::default()).map_err(named)?;
     if let Some(dir) = &args.out {
         write(&found, &range, dir)?;
         let material = fabric_to_json(&found.fabric(&fabric))?;
@@ -78,12 +81,18 @@ fn table(fit: &Fit, range: &Range) -> String {
             text,
             "{name:<24} {:.4e} N m, at rest {:.1} 1/m, error {:.2} %; curvature to {:.1} 1/m",
             bending.rigidity,
-            bending.rest(),
+            bending.rest() + 0.0,
             1e2 * bending.error,
             range.curvature
         );
     }
     let _ = writeln!(text, "{:<24} {}", "corrections", fit.corrections);
+    if fit.errors[0] > POOR {
+        let _ = writeln!(
+            text,
+            "note: triangles of constant stiffness follow this fabric poorly: the material is no more than a mean over these strains"
+        );
+    }
     text
 }
 
