@@ -7,7 +7,7 @@
 //! ```
 //!
 //! Images are riders ([`crate::blend::Riders`]) on their own node and on two further points, which stand for `A_1` and
-//! `A_2` as vertices without triangles: held, they prescribe `F`; free, the fabric finds its size. Every energy is the
+//! `A_2` as vertices without triangles, held where `F` has them. Every energy is the
 //! system's own, with its part in the cell ([`crate::yarn::periodic`]); gravity is off, and so is the contact of spheres,
 //! as yarns of a flat cell are kept apart by their contacts.
 //!
@@ -23,10 +23,9 @@
 use crate::blend::{Coupling, Rider, Riders};
 use crate::cloth::Cloth;
 use crate::error::{Error, Result};
-use crate::math::{Mat2, Mat3, Vec2, Vec3};
-use crate::pattern::curve::Curve;
+use crate::math::{Mat3, Vec2, Vec3};
 use crate::pattern::yarn_fabric::{Knit, Structure, YarnFabric};
-use crate::pattern::{Edge, Fabric, Garment, Panel, Placement};
+use crate::pattern::{Fabric, Garment};
 use crate::solve::engine::Engine;
 use crate::solve::relax::{End, RelaxOptions, relax};
 use crate::solve::settings::Settings;
@@ -34,6 +33,7 @@ use crate::system::build::{BuildOptions, System};
 use crate::system::state::{Pin, State};
 use crate::system::yarn::friction::loose;
 use crate::tri::GarmentMesh;
+use crate::tri::grid::rectangle;
 use crate::yarn::layout::{Layout, lay};
 use crate::yarn::periodic::NodeImage;
 use crate::yarn::{YarnMaterial, Yarns};
@@ -44,6 +44,8 @@ use std::sync::Arc;
 const MARGIN: f64 = 6.0;
 /// Corrections of one relaxation.
 const STEPS: u64 = 4000;
+/// Part of two radii below which yarns count as touching.
+const NEARER: f64 = 0.999;
 /// First and largest step of a relaxation [s].
 const STEPS_IN_TIME: [f64; 2] = [0.01, 10.0];
 
@@ -108,12 +110,7 @@ impl PeriodicCell {
             apart: pitch.max(),
             bend: None,
         };
-        cell.engine
-            .system
-            .points
-            .coupling
-            .carry(&mut cell.state.positions);
-        cell.hold();
+        cell.settle();
         Ok(cell)
     }
 
@@ -147,7 +144,7 @@ impl PeriodicCell {
         let own = (0..x.len()).filter(|n| mesh.is_inside(*n as u32));
         own.flat_map(|a| (0..x.len()).map(move |b| (a, b)))
             .map(|(a, b)| [(mesh.uv[a] - mesh.uv[b]).norm(), (x[a] - x[b]).norm()])
-            .find(|[laid, now]| *laid >= self.apart && *now < 1.998 * radius)
+            .find(|[laid, now]| *laid >= self.apart && *now < 2.0 * NEARER * radius)
     }
 
     /// Positions of the yarns' nodes [m].
@@ -170,17 +167,7 @@ impl PeriodicCell {
         }
         self.state.positions[0] = to.column(0) * self.size.x;
         self.state.positions[1] = to.column(1) * self.size.y;
-        self.engine
-            .system
-            .points
-            .coupling
-            .carry(&mut self.state.positions);
-        self.hold();
-    }
-
-    /// Lets the lattice go: the fabric finds its size.
-    pub fn release(&mut self) {
-        self.state.pins.clear();
+        self.settle();
     }
 
     /// This cell on a cylinder, curved along an axis of the layout (0 across, 1 along), with a curvature [1/m] that is
@@ -214,17 +201,14 @@ impl PeriodicCell {
             apart: self.apart,
             bend: Some(bend),
         };
-        cell.engine
-            .system
-            .points
-            .coupling
-            .carry(&mut cell.state.positions);
-        cell.hold();
+        cell.settle();
         Ok(cell)
     }
 
-    /// Holds the lattice where it is.
-    fn hold(&mut self) {
+    /// Puts the images where the nodes and the lattice have them, and holds the lattice there.
+    fn settle(&mut self) {
+        let coupling = &self.engine.system.points.coupling;
+        coupling.carry(&mut self.state.positions);
         let (count, x) = (self.points().0, &self.state.positions);
         let pin = |k: usize| Pin {
             vertex: k as u32,
@@ -294,11 +278,6 @@ impl PeriodicCell {
         let forces = self.engine.forces(&self.state)?;
         let [a, b] = [forces[0] / self.size.y, forces[1] / self.size.x];
         Ok(Matrix3x2::from_columns(&[a, b]))
-    }
-
-    /// Largest force on what is free [N].
-    pub fn residual(&mut self) -> Result<f64> {
-        self.engine.residual(&self.state)
     }
 }
 
@@ -449,40 +428,13 @@ fn laid_state(yarns: &Yarns, mut positions: Vec<Vec3>) -> State {
 
 /// A garment of one rectangle of the fabric.
 fn swatch(fabric: &YarnFabric, size: Vec2) -> Garment {
-    let edge = |k: u32| Edge {
-        start: k,
-        end: (k + 1) % 4,
-        curve: Curve::Line,
-        label: None,
-    };
-    let corner = |x: f64, y: f64| Vec2::new(x * size.x, y * size.y);
     Garment {
         name: "cell".into(),
-        panels: vec![Panel {
-            name: "cell".into(),
-            vertices: vec![
-                corner(0.0, 0.0),
-                corner(1.0, 0.0),
-                corner(1.0, 1.0),
-                corner(0.0, 1.0),
-            ],
-            outline: (0..4).map(edge).collect(),
-            holes: Vec::new(),
-            placement: Placement::default(),
-            fabric: 0,
-            grain: 0.0,
-            edge_length: None,
-            label: None,
-        }],
+        panels: vec![rectangle("cell", size.x, size.y)],
         fabrics: vec![Fabric {
             yarns: Some(fabric.clone()),
             ..Fabric::default()
         }],
         ..Garment::default()
     }
-}
-
-/// Green strain `(F^T F - I) / 2`.
-pub fn green(f: &Matrix3x2<f64>) -> Mat2 {
-    (f.transpose() * f - Mat2::identity()) * 0.5
 }

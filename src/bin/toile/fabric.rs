@@ -81,7 +81,7 @@ fn table(fit: &Fit, range: &Range) -> String {
             text,
             "{name:<24} {:.4e} N m, at rest {:.1} 1/m, error {:.2} %; curvature to {:.1} 1/m",
             bending.rigidity,
-            bending.rest() + 0.0,
+            bending.rest(),
             1e2 * bending.error,
             range.curvature
         );
