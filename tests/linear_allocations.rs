@@ -7,7 +7,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use toile::math::Vec3;
 use toile::math::parallel::Workers;
-use toile::solve::linear::choose::solver;
+use toile::solve::linear::choose::{Made, solver};
 
 struct Counting;
 
@@ -37,7 +37,12 @@ fn a_second_solve_on_the_same_pattern_allocates_nothing() {
     let b = linear_cases::forces(case.matrix.n(), 3);
     let mut x = vec![Vec3::zeros(); b.len()];
     for kind in [0, 1, 2, 3] {
-        let mut solver = solver(kind, b.len(), Some(&case.priorities), &Workers::default());
+        let mut solver = solver(
+            kind,
+            b.len(),
+            Made::Triangles(Some(&case.priorities)),
+            &Workers::default(),
+        );
         solver.prepare(&case.matrix).expect("prepares");
         solver
             .solve(&case.matrix, &b, &mut x, 1e-6)

@@ -6,12 +6,14 @@ use crate::linear_cases::{Random, add, forces, residual, sewn_cloth};
 use toile::math::block::{BlockMatrix, BlockPattern};
 use toile::math::parallel::Workers;
 use toile::math::{Mat3, Vec3};
-use toile::solve::linear::choose::solver;
+use toile::solve::linear::choose::{Made, solver};
 use toile::solve::linear::direct::Direct;
+use toile::solve::linear::graph::Graph;
 use toile::solve::linear::ic0::{IncompleteCholesky, Order, Storage};
 use toile::solve::linear::jacobi::BlockJacobi;
 use toile::solve::linear::ordering::{ORDINARY, reverse_cuthill_mckee};
 use toile::solve::linear::pcg::{ConjugateGradients, Preconditioner};
+use toile::solve::linear::schwarz::Schwarz;
 use toile::solve::linear::{LinearError, LinearSolver};
 
 fn all(priorities: &[u8]) -> Vec<Box<dyn LinearSolver>> {
@@ -22,6 +24,8 @@ fn all(priorities: &[u8]) -> Vec<Box<dyn LinearSolver>> {
     vec![
         Box::new(Direct::new(&Workers::default())),
         cg(Box::new(BlockJacobi::new())),
+        cg(Box::new(Schwarz::with_parts(&Workers::new(2), 20))),
+        cg(Box::new(Schwarz::new(&Workers::default()))),
         ic(Order::Natural, Storage::F64),
         ic(Order::CuthillMckee, Storage::F32),
         ic(Order::Priorities(priorities.to_vec()), Storage::F64),
@@ -285,7 +289,12 @@ fn slow_incomplete_factors_are_left() {
     let case = sewn_cloth(1_600, 4, 1e-2);
     let b = forces(case.matrix.n(), 1);
     let mut x = vec![Vec3::zeros(); b.len()];
-    let mut automatic = solver(0, 2_000, Some(&case.priorities), &Workers::default());
+    let mut automatic = solver(
+        0,
+        2_000,
+        Made::Triangles(Some(&case.priorities)),
+        &Workers::default(),
+    );
     for _ in 0..2 {
         automatic.prepare(&case.matrix).expect("prepares");
         assert_eq!(automatic.name(), "cg_ic0");
@@ -304,22 +313,28 @@ fn slow_incomplete_factors_are_left() {
 /// Numbers in the settings choose what they say; the automatic choice follows the stiffness.
 #[test]
 fn the_choice_follows_its_number() {
-    assert_eq!(
-        solver(1, 2_000, None, &Workers::default()).name(),
-        "cholesky"
-    );
-    assert_eq!(
-        solver(2, 2_000, None, &Workers::default()).name(),
-        "cg_jacobi"
-    );
-    assert_eq!(
-        solver(3, 2_000, Some(&[0; 10]), &Workers::default()).name(),
-        "cg_ic0"
-    );
-    assert_eq!(
-        solver(4, 2_000, None, &Workers::default()).name(),
-        "cg_cholesky"
-    );
+    let sheet = Made::Triangles(Some(&[0; 10]));
+    for (kind, n, made, name) in [
+        (1, 2_000, sheet, "cholesky"),
+        (2, 2_000, sheet, "cg_jacobi"),
+        (3, 2_000, sheet, "cg_ic0"),
+        (4, 2_000, sheet, "cg_cholesky"),
+        (5, 2_000, sheet, "cg_schwarz"),
+        (0, 200, sheet, "cholesky"),
+    ] {
+        assert_eq!(solver(kind, n, made, &Workers::default()).name(), name);
+    }
+    for (n, h, expected) in [
+        (1_600, 1e-2, "cholesky"),
+        (9_000, 1e-2, "cg_schwarz"),
+        (9_000, 1e2, "cholesky"),
+        (21_000, 1e2, "cg_cholesky"),
+    ] {
+        let case = sewn_cloth(n, 4, h);
+        let mut automatic = solver(0, n, Made::Yarns, &Workers::default());
+        automatic.prepare(&case.matrix).expect("prepares");
+        assert_eq!(automatic.name(), expected, "{n} blocks of yarns, step {h}");
+    }
     for (n, h, expected) in [
         (1_600, 1e-2, "cg_ic0"),
         (4_900, 1e-3, "cg_ic0"),
@@ -328,7 +343,12 @@ fn the_choice_follows_its_number() {
         let case = sewn_cloth(n, 4, h);
         let b = forces(case.matrix.n(), 1);
         let mut x = vec![Vec3::zeros(); b.len()];
-        let mut automatic = solver(0, 2_000, Some(&case.priorities), &Workers::default());
+        let mut automatic = solver(
+            0,
+            2_000,
+            Made::Triangles(Some(&case.priorities)),
+            &Workers::default(),
+        );
         automatic.prepare(&case.matrix).expect("prepares");
         assert_eq!(automatic.name(), expected, "{n} vertices, step {h}");
         automatic
@@ -360,4 +380,46 @@ fn subtrees_side_by_side_give_the_same_bits_and_the_solution() {
             assert_eq!(p.map(f64::to_bits), q.map(f64::to_bits));
         }
     }
+}
+
+/// Parts have one order: what they add up to is the same for any number of threads, and of use.
+#[test]
+fn overlapping_parts_give_the_same_bits_and_few_iterations() {
+    let case = sewn_cloth(1_600, 3, 1e-3);
+    let b = forces(case.matrix.n(), 3);
+    let solve = |preconditioner: Box<dyn Preconditioner>| {
+        let mut cg = ConjugateGradients::new(preconditioner);
+        cg.prepare(&case.matrix).expect("prepares");
+        let mut x = vec![Vec3::zeros(); b.len()];
+        let count = cg.solve(&case.matrix, &b, &mut x, 1e-8).expect("solves");
+        (count, x)
+    };
+    let parted = |threads: usize| {
+        let parts = Schwarz::with_parts(&Workers::new(threads), 200);
+        solve(Box::new(parts))
+    };
+    let (count, one) = parted(1);
+    let (jacobi, _) = solve(Box::new(BlockJacobi::new()));
+    assert!(4 * count < jacobi, "{count} and {jacobi} iterations");
+    for threads in [2, 3] {
+        for (p, q) in one.iter().zip(&parted(threads).1) {
+            assert_eq!(p.map(f64::to_bits), q.map(f64::to_bits));
+        }
+    }
+}
+
+/// Every row of a graph, joined or not, is in one set of its halves.
+#[test]
+fn halves_have_every_row_once() {
+    let pattern = BlockPattern::from_stencils(1_000, |sink| {
+        // a band, cut in two, and rows alone
+        for i in (0..899).filter(|i| *i != 400) {
+            sink(&[i, i + 1, (i + 7).min(899)]);
+        }
+    });
+    let sets = Graph::new(&pattern).halved(64);
+    let mut rows: Vec<u32> = sets.iter().flatten().copied().collect();
+    rows.sort_unstable();
+    assert_eq!(rows, (0..1_000).collect::<Vec<u32>>());
+    assert!(sets.iter().all(|set| (32..=64).contains(&set.len())));
 }

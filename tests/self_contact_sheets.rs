@@ -9,7 +9,7 @@ use toile::math::block::{BlockMatrix, BlockPattern};
 use toile::math::parallel::Workers;
 use toile::math::topology::edges;
 use toile::math::{Mat3, Vec3};
-use toile::solve::linear::choose::solver;
+use toile::solve::linear::choose::{Made, solver};
 use toile::system::contact::crossing::{crossings, crossings_with, passes};
 use toile::system::contact::self_contact::SelfContact;
 use toile::system::points::Points;
@@ -85,7 +85,7 @@ fn implicit(sheets: &Sheets, contact: &SelfContact, dt: f64) -> Vec<Vec3> {
             sink(contact.stencils().get(e));
         }
     });
-    let mut solver = solver(0, n, None, &Workers::default());
+    let mut solver = solver(0, n, Made::Triangles(None), &Workers::default());
     let mut x: Vec<Vec3> = x0.clone();
     let mut dx = vec![Vec3::zeros(); n];
     for _ in 0..3 {

@@ -19,6 +19,12 @@
 //! [`MANY`], the matrices that follow get kept factors. A skirt of 3 986 vertices that falls down
 //! itself: two steps of 1/60 s took 6.8 CPU seconds with IC(0) alone, 2.2 with kept factors.
 //!
+//! Yarns, whose stretch is 1e4 times as stiff as their bending, have a `rho` of 1e5 at 1 ms. Incomplete factors take hundreds of
+//! iterations there; in motion large systems of yarns get factors of overlapping parts
+//! ([`super::schwarz`]), and every matrix of small ones is factored as a whole. In a hanging swatch of 16 772
+//! nodes at 1 ms, six steps took 67 s by parts on a busy machine, and more than 130 s, where they were stopped, by
+//! incomplete or by whole factors.
+//!
 //! `rho` is read off the matrix: internal stiffness has zero row sums, so what a row's blocks sum
 //! to is its mass term, and `rho` is the median over vertices of trace(diagonal block) over
 //! trace(row sum). Vertices held by a body count as heavy ones, the median ignores them while they
@@ -30,6 +36,7 @@ use super::factored::SingleFactor;
 use super::ic0::{IncompleteCholesky, Order, Storage};
 use super::jacobi::BlockJacobi;
 use super::pcg::ConjugateGradients;
+use super::schwarz::Schwarz;
 use super::stiff_part::StiffPart;
 use super::{LinearError, LinearSolver};
 use crate::math::block::BlockMatrix;
@@ -42,40 +49,56 @@ const CROSSOVER_RATIO: f64 = 2e4;
 /// Iterations of conjugate gradients beyond which incomplete factors are not enough.
 const MANY: u32 = 50;
 
-/// Vertices below which a Cholesky factor takes about a millisecond.
+/// The same of yarns, below which factors of parts are enough; 10 ms of a hanging knit are below.
+const CROSSOVER_RATIO_YARNS: f64 = 1e7;
+
+/// Blocks below which every matrix is factored: for triangles such a factor takes about a millisecond.
 const ALWAYS_DIRECT: usize = 300;
+/// The same of a system with yarns, in motion and in all else.
+const ALWAYS_DIRECT_YARNS: [usize; 2] = [8_000, 20_000];
+
+/// Iterations up to which factors are kept for the next matrix: of the whole, which are costly, and of parts.
+const KEPT: [u32; 2] = [15, 4];
+
+/// What a system is made of, as far as its matrices show it.
+#[derive(Clone, Copy)]
+pub enum Made<'a> {
+    /// Of triangles. The priorities (see [`super::ordering`]), one for each block row, mark the vertices of seams for the
+    /// incomplete factorization.
+    Triangles(Option<&'a [u8]>),
+    /// Of yarns, alone or with triangles.
+    Yarns,
+}
 
 /// A solver by its number in the settings, for `n` block rows: 0 chooses for each matrix, 1 sparse
 /// Cholesky, 2 conjugate gradients with block Jacobi, 3 with incomplete Cholesky, 4 with the factor
-/// of an earlier matrix. Other numbers are taken as 0: the settings refuse them at the door.
-///
-/// `priorities` (see [`super::ordering`]), one for each block row, mark the vertices of seams for
-/// the incomplete factorization.
-pub fn solver(
-    kind: u32,
-    n: usize,
-    priorities: Option<&[u8]>,
-    workers: &Workers,
-) -> Box<dyn LinearSolver> {
+/// of an earlier matrix, 5 with the factors of its overlapping parts. Other numbers are taken as 0: the settings
+/// refuse them at the door.
+pub fn solver(kind: u32, n: usize, made: Made<'_>, workers: &Workers) -> Box<dyn LinearSolver> {
     match kind {
         1 => Box::new(Direct::new(workers)),
         2 => Box::new(ConjugateGradients::new(Box::new(BlockJacobi::new()))),
-        3 => Box::new(incomplete(priorities)),
+        3 => Box::new(incomplete(made)),
         4 => Box::new(factored(workers)),
+        5 => Box::new(parted(workers)),
         _ if n < ALWAYS_DIRECT => Box::new(Direct::new(workers)),
-        _ => Box::new(Automatic::new(priorities, workers)),
+        _ => Box::new(Automatic::new(made, workers)),
     }
 }
 
 fn factored(workers: &Workers) -> ConjugateGradients {
     let factor = Box::new(SingleFactor::new(workers));
-    ConjugateGradients::new(Box::new(StiffPart::new(factor))).for_newton()
+    ConjugateGradients::new(Box::new(StiffPart::new(factor))).for_newton(KEPT[0])
 }
 
-fn incomplete(priorities: Option<&[u8]>) -> ConjugateGradients {
-    let order = match priorities {
-        Some(p) => Order::Priorities(p.to_vec()),
-        None => Order::CuthillMckee,
+fn parted(workers: &Workers) -> ConjugateGradients {
+    ConjugateGradients::new(Box::new(Schwarz::new(workers))).for_newton(KEPT[1])
+}
+
+fn incomplete(made: Made<'_>) -> ConjugateGradients {
+    let order = match made {
+        Made::Triangles(Some(p)) => Order::Priorities(p.to_vec()),
+        _ => Order::CuthillMckee,
     };
     let factor = Box::new(IncompleteCholesky::new(order, Storage::F64));
     ConjugateGradients::new(factor)
@@ -84,10 +107,15 @@ fn incomplete(priorities: Option<&[u8]>) -> ConjugateGradients {
 /// Chooses for each matrix; what the others refuse is solved directly.
 pub struct Automatic {
     direct: Direct,
-    incomplete: ConjugateGradients,
+    /// For matrices in which inertia has a say.
+    near: ConjugateGradients,
+    /// Stiffness over mass up to which that is tried.
+    crossover: f64,
     factored: ConjugateGradients,
+    /// Blocks below which a matrix is factored as it is, in motion and in all else.
+    always_direct: [usize; 2],
     chosen: Choice,
-    /// Whether incomplete factors were not enough for a matrix since the last `forget`.
+    /// Whether `near` was not enough for a matrix since the last `forget`.
     slow: bool,
     ratios: Vec<f64>,
     sums: Vec<Mat3>,
@@ -96,16 +124,28 @@ pub struct Automatic {
 #[derive(Clone, Copy, PartialEq)]
 enum Choice {
     Direct,
-    Incomplete,
+    Near,
     Factored,
 }
 
 impl Automatic {
-    /// With the priorities of [`solver`].
-    pub fn new(priorities: Option<&[u8]>, workers: &Workers) -> Self {
+    /// For what a system is made of.
+    pub fn new(made: Made<'_>, workers: &Workers) -> Self {
+        let yarns = matches!(made, Made::Yarns);
         Self {
             direct: Direct::new(workers),
-            incomplete: incomplete(priorities),
+            near: if yarns {
+                parted(workers)
+            } else {
+                incomplete(made)
+            },
+            crossover: if yarns {
+                CROSSOVER_RATIO_YARNS
+            } else {
+                CROSSOVER_RATIO
+            },
+            // yarns begin and cease to slide: their blocks are counted in each matrix
+            always_direct: if yarns { ALWAYS_DIRECT_YARNS } else { [0; 2] },
             factored: factored(workers),
             chosen: Choice::Direct,
             slow: false,
@@ -117,7 +157,7 @@ impl Automatic {
     fn chosen(&self) -> &dyn LinearSolver {
         match self.chosen {
             Choice::Direct => &self.direct,
-            Choice::Incomplete => &self.incomplete,
+            Choice::Near => &self.near,
             Choice::Factored => &self.factored,
         }
     }
@@ -158,20 +198,22 @@ impl LinearSolver for Automatic {
     }
 
     fn forget(&mut self) {
+        self.near.forget();
         self.factored.forget();
         self.chosen = Choice::Direct;
         self.slow = false;
     }
 
     fn prepare(&mut self, matrix: &BlockMatrix) -> Result<(), LinearError> {
-        if !self.slow && self.stiffness_ratio(matrix) < CROSSOVER_RATIO {
-            self.chosen = Choice::Incomplete;
-            if self.incomplete.prepare(matrix).is_ok() {
+        let direct = self.always_direct.map(|least| matrix.n() < least);
+        if !direct[0] && !self.slow && self.stiffness_ratio(matrix) < self.crossover {
+            self.chosen = Choice::Near;
+            if self.near.prepare(matrix).is_ok() {
                 return Ok(());
             }
         }
         self.chosen = Choice::Factored;
-        if self.factored.prepare(matrix).is_ok() {
+        if !direct[1] && self.factored.prepare(matrix).is_ok() {
             return Ok(());
         }
         self.chosen = Choice::Direct;
@@ -187,10 +229,10 @@ impl LinearSolver for Automatic {
     ) -> Result<u32, LinearError> {
         let solved = match self.chosen {
             Choice::Direct => return self.direct.solve(matrix, b, x, tolerance),
-            Choice::Incomplete => self.incomplete.solve(matrix, b, x, tolerance),
+            Choice::Near => self.near.solve(matrix, b, x, tolerance),
             Choice::Factored => self.factored.solve(matrix, b, x, tolerance),
         };
-        if self.chosen == Choice::Incomplete {
+        if self.chosen == Choice::Near {
             self.slow = !solved.as_ref().is_ok_and(|&count| count <= MANY);
         }
         match solved {
@@ -205,7 +247,7 @@ impl LinearSolver for Automatic {
 
     fn bytes(&self) -> usize {
         self.direct.bytes()
-            + self.incomplete.bytes()
+            + self.near.bytes()
             + self.factored.bytes()
             + 8 * self.ratios.len()
             + size_of::<Mat3>() * self.sums.len()

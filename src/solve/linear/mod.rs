@@ -2,8 +2,8 @@
 //!
 //! * [`direct`]: supernodal Cholesky, ordered by approximate minimum degree on the block graph.
 //! * [`pcg`]: conjugate gradients with a [`pcg::Preconditioner`]: [`jacobi`] (3x3 diagonal blocks),
-//!   [`ic0`] (incomplete Cholesky on the pattern of `A`, in an [`ordering`]) or [`factored`] (the
-//!   complete factor of an earlier matrix), the latter two made from the [`stiff_part`].
+//!   [`ic0`] (incomplete Cholesky on the pattern of `A`, in an [`ordering`]), [`factored`] (the
+//!   complete factor of an earlier matrix, of its [`stiff_part`]) or [`schwarz`] (factors of overlapping parts of the [`graph`]).
 //! * [`constrained`]: the same with linear constraints between the unknowns, of blended rings.
 //! * [`choose`]: which of them, by number or by measured crossover.
 
@@ -12,10 +12,12 @@ pub mod choose;
 pub mod constrained;
 pub mod direct;
 pub mod factored;
+pub mod graph;
 pub mod ic0;
 pub mod jacobi;
 pub mod ordering;
 pub mod pcg;
+pub mod schwarz;
 pub mod stiff_part;
 mod substitution;
 

@@ -7,6 +7,7 @@
 //! factorization does well when large entries come early. Both are a function of the pattern (and
 //! the priorities) alone.
 
+use super::graph::Graph;
 use crate::math::block::BlockPattern;
 use crate::tri::GarmentMesh;
 
@@ -36,10 +37,7 @@ pub fn seam_priorities(mesh: &GarmentMesh) -> Vec<u8> {
 /// priority stay in reverse Cuthill-McKee order.
 pub fn reverse_cuthill_mckee(pattern: &BlockPattern, priorities: Option<&[u8]>) -> Vec<u32> {
     let n = pattern.n();
-    let (starts, neighbours) = adjacency(pattern);
-    let of = |v: u32| &neighbours[starts[v as usize]..starts[v as usize + 1]];
-    let degree = |v: u32| starts[v as usize + 1] - starts[v as usize];
-
+    let graph = Graph::new(pattern);
     let mut order: Vec<u32> = Vec::with_capacity(n);
     let mut level = vec![u32::MAX; n];
     let mut placed = vec![false; n];
@@ -52,7 +50,7 @@ pub fn reverse_cuthill_mckee(pattern: &BlockPattern, priorities: Option<&[u8]>) 
         let mut root = seed;
         let mut depth = 0;
         loop {
-            let (far, far_depth, seen) = farthest(root, &of, &degree, &mut level, &mut front);
+            let (far, far_depth, seen) = farthest(root, &graph, &mut level, &mut front);
             for v in seen {
                 level[v as usize] = u32::MAX;
             }
@@ -70,13 +68,13 @@ pub fn reverse_cuthill_mckee(pattern: &BlockPattern, priorities: Option<&[u8]>) 
             let v = order[head];
             head += 1;
             let tail = order.len();
-            for &w in of(v) {
+            for &w in graph.of(v) {
                 if !placed[w as usize] {
                     placed[w as usize] = true;
                     order.push(w);
                 }
             }
-            order[tail..].sort_unstable_by_key(|&w| (degree(w), w));
+            order[tail..].sort_unstable_by_key(|&w| (graph.degree(w), w));
         }
     }
     order.reverse();
@@ -87,10 +85,9 @@ pub fn reverse_cuthill_mckee(pattern: &BlockPattern, priorities: Option<&[u8]>) 
 }
 
 /// Last vertex of smallest degree on the deepest level around `root`, the depth, and what was seen.
-fn farthest<'a>(
+fn farthest(
     root: u32,
-    of: &impl Fn(u32) -> &'a [u32],
-    degree: &impl Fn(u32) -> usize,
+    graph: &Graph,
     level: &mut [u32],
     front: &mut Vec<u32>,
 ) -> (u32, u32, Vec<u32>) {
@@ -101,7 +98,7 @@ fn farthest<'a>(
     while head < front.len() {
         let v = front[head];
         head += 1;
-        for &w in of(v) {
+        for &w in graph.of(v) {
             if level[w as usize] == u32::MAX {
                 level[w as usize] = level[v as usize] + 1;
                 front.push(w);
@@ -113,36 +110,7 @@ fn farthest<'a>(
         .iter()
         .copied()
         .filter(|&v| level[v as usize] == depth)
-        .min_by_key(|&v| (degree(v), v))
+        .min_by_key(|&v| (graph.degree(v), v))
         .unwrap_or(root);
     (far, depth, front.clone())
-}
-
-/// Both directions of the graph, without the diagonal.
-fn adjacency(pattern: &BlockPattern) -> (Vec<usize>, Vec<u32>) {
-    let n = pattern.n();
-    let mut starts = vec![0_usize; n + 1];
-    let each = |visit: &mut dyn FnMut(usize, usize)| {
-        for j in 0..n {
-            for k in pattern.starts[j] as usize + 1..pattern.starts[j + 1] as usize {
-                visit(pattern.rows[k] as usize, j);
-            }
-        }
-    };
-    each(&mut |i, j| {
-        starts[i + 1] += 1;
-        starts[j + 1] += 1;
-    });
-    for v in 0..n {
-        starts[v + 1] += starts[v];
-    }
-    let mut next = starts.clone();
-    let mut neighbours = vec![0_u32; starts[n]];
-    each(&mut |i, j| {
-        neighbours[next[i]] = j as u32;
-        next[i] += 1;
-        neighbours[next[j]] = i as u32;
-        next[j] += 1;
-    });
-    (starts, neighbours)
 }

@@ -26,14 +26,14 @@ pub trait Preconditioner: Send {
     fn bytes(&self) -> usize;
 }
 
-/// Iterations up to which a preconditioner is kept for the next matrix.
-const KEPT: u32 = 15;
 /// Iterations after which a solution of a series is taken as it is.
 const ENOUGH: u32 = 60;
 
 /// State of a solver for the slowly changing matrices of Newton's method.
 #[derive(Clone, Debug, Default)]
 struct Series {
+    /// Iterations up to which a preconditioner is kept for the next matrix.
+    keep: u32,
     /// Pattern of the matrix that the preconditioner was made for, while it is good enough.
     prepared: Option<BlockPattern>,
 }
@@ -68,11 +68,14 @@ impl ConjugateGradients {
     }
 
     /// For the directions of Newton's method: the preconditioner is kept for later matrices of the
-    /// same pattern while the iterations stay few, and an iteration that is long or meets negative
+    /// same pattern while the iterations are at most `keep`, and an iteration that is long or meets negative
     /// curvature ends with what it has, a direction of descent (Steihaug 1983).
     #[must_use]
-    pub fn for_newton(mut self) -> Self {
-        self.series = Some(Series::default());
+    pub fn for_newton(mut self, keep: u32) -> Self {
+        self.series = Some(Series {
+            keep,
+            prepared: None,
+        });
         self.limit = Some(ENOUGH);
         self
     }
@@ -138,8 +141,8 @@ impl LinearSolver for ConjugateGradients {
         let mut iterations = 0;
         for _ in 0..=RESTARTS {
             let done = self.iterate(matrix, x, goal, limit, &mut iterations);
-            if self.series.is_some() {
-                if iterations > KEPT {
+            if let Some(keep) = self.series.as_ref().map(|s| s.keep) {
+                if iterations > keep {
                     self.discard();
                 }
                 let direction = x.iter().any(|v| *v != Vec3::zeros());
