@@ -6,6 +6,7 @@ use crate::yarn_sims::{WHOLE, knit, patch, sim};
 use std::sync::Arc;
 use toile::math::Vec3;
 use toile::math::parallel::Workers;
+use toile::pattern::export::garment_to_json;
 use toile::pattern::import::garment_from_json;
 use toile::scene::Scene;
 use toile::sim::{DrapeOptions, Sim, YarnChanges};
@@ -285,11 +286,28 @@ fn total(yarns: &Yarns, state: &State) -> Vec3 {
     all.map(|y| momentum(yarns, y, first, state)).sum()
 }
 
+/// The yarn of a knit whose ends are woven in holds all loops; if they are not, its end and the loops before it come out.
+#[test]
+fn ends_that_are_woven_in_hold_their_loops() {
+    for (fastened, comes) in [(true, false), (false, true)] {
+        let yarns = format!(r#"{{"preset": "jersey", "fastened": {fastened}}}"#);
+        let garment = garment_from_json(&patch(&yarns, 0.015, 0.015, WHOLE), None).unwrap();
+        let back = garment_to_json(&garment).unwrap();
+        assert_eq!(garment_from_json(&back, None).unwrap(), garment);
+        let mesh = lay(&garment, &Layout::default()).unwrap();
+        let list = passings(&mesh);
+        let any = |f: fn(&Passing) -> bool| list.iter().any(f);
+        assert_eq!(any(|p| matches!(p, Passing::End(_))), comes);
+        assert_eq!(any(|p| *p == Passing::Loop), comes);
+        assert!(any(|p| matches!(p, Passing::Lone(_))));
+    }
+}
+
 /// Length, mass and linear momentum of every yarn are what they were when an end slips out of its contact, when a
 /// contact passes a node of one yarn, and when a loop comes out.
 #[test]
 fn what_comes_off_keeps_length_and_momentum() {
-    let jersey = r#"{"preset": "jersey"}"#;
+    let jersey = r#"{"preset": "jersey", "fastened": false}"#;
     for (fabric, wanted, lost, split) in [
         (PLAIN, Passing::End(1), 1, 0),
         (jersey, Passing::Lone(1), 1, 0),
