@@ -66,6 +66,8 @@ const SETTLED: u64 = 30;
 
 /// Least part of their way by which pins are moved at once.
 const LEAST_PART: f64 = 1e-3;
+/// Way of pins, over the length of a segment of yarn, from which they go in parts and wait.
+pub(super) const FAR: f64 = 2.0;
 /// Way of pins in one correction over the length of a segment of yarn: what is beside them is left behind.
 const PIN_WAY: f64 = 0.5;
 /// Residual over the stiffness of yarn, as a strain, below which pins go on.
@@ -110,8 +112,11 @@ pub fn relax(
     let mut part = 1.0_f64;
     let mut waits = false;
     let near = PIN_STRAIN * engine.system.yarn_stiffness();
+    let far = pin_part(engine, state, FAR) < 1.0;
     while out.totals.substeps < options.max_steps {
-        part = part.min(pin_part(engine, state, PIN_WAY));
+        if far {
+            part = part.min(pin_part(engine, state, PIN_WAY));
+        }
         // pins wait for the yarns beside them
         let fraction = if waits { 0.0 } else { part };
         let exact = pace.exactness(engine);
@@ -157,7 +162,7 @@ pub fn relax(
         out.totals.substeps += 1;
         out.totals.residual = summary.static_residual;
         part = (2.0 * part).min(1.0);
-        waits = summary.static_residual > near;
+        waits = far && summary.static_residual > near;
         // short steps that are taken do lead on: only refused ones may end the relaxation
         h = pace.taken(engine, state, &summary, h);
         h = h.clamp(SMALLEST_STEP, options.largest_step);

@@ -22,8 +22,6 @@ const SHORTEST: f64 = 3e-3;
 const ATTEMPTS: u64 = 10;
 /// A last correction below this shows the Hessian at the end by that before it [m].
 const SHOWN: f64 = 1e-4;
-/// Way of pins, over the length of a segment of yarn, that the linear answer to it is good for.
-pub const PIN_WAY: f64 = 2.0;
 /// Vertices above which the memory of a complete factor in f64 is not taken.
 pub const LARGEST: usize = 20_000;
 
