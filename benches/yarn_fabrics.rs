@@ -2,8 +2,9 @@
 //!
 //! Patches of 16 by 16 loops of the sweater's yarn (loops of 3 mm, radius 0.75 mm, friction 0.3), their grips as wide as laid:
 //! rib 2x2 along its courses, jersey along courses and wales; and a strip of plain weave on the bias. Prints for
-//! each length the force, the residual and the Newton iterations.
-//! Arguments: `--quick` for 8 by 8 loops, `--plot FILE.svg` for a picture of the curves of the knits.
+//! each length the force, the residual and the Newton iterations. Then openwork at rest: the hole of a yarn-over, the scallops of
+//! feather and fan.
+//! Arguments: `--quick` for 8 by 8 loops, `--lace` for the openwork alone, `--plot FILE.svg` for a picture of the curves of the knits.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -14,6 +15,7 @@
 mod yarn_pull;
 
 use toile::readout::plot::{Curve, Plot};
+use yarn_pull::lace::{self, openings, scallops};
 use yarn_pull::{Reading, Swatch, stretch_at};
 
 /// Up and down.
@@ -47,17 +49,45 @@ fn run(name: &str, mut swatch: Swatch, width: f64, path: &[f64]) -> (Curve, Vec<
     (curve, all)
 }
 
+/// Openwork at rest between two grips: what a yarn-over opens, and how feather and fan scallops its edges.
+fn lace(n: usize) {
+    for hole in [false, true] {
+        let mut swatch = lace::eyelet(n, hole);
+        let reading = swatch.pull(1.0);
+        let areas = openings(&swatch.sim, Swatch::knit_size(n, n));
+        println!(
+            "\njersey, yarn-over {hole}: largest openings {:.2?} mm2, residual {:.1e} N, Newton {}",
+            areas.iter().take(2).map(|a| 1e6 * a).collect::<Vec<_>>(),
+            reading.residual,
+            reading.newton
+        );
+    }
+    for fan in [false, true] {
+        let mut swatch = lace::feather_and_fan(n, fan);
+        let (residual, newton) = swatch.rest();
+        println!(
+            "36 by {n} loops, feather and fan {fan}: scallops of {:.4} of their length, residual {residual:.1e} N, Newton {newton}",
+            scallops(&swatch.sim)
+        );
+    }
+}
+
 fn main() {
     let mut args = std::env::args().skip(1);
-    let (mut quick, mut plot) = (false, None);
+    let (mut quick, mut open, mut plot) = (false, false, None);
     while let Some(arg) = args.next() {
         match arg.as_str() {
             "--quick" => quick = true,
+            "--lace" => open = true,
             "--plot" => plot = args.next(),
             _ => {}
         }
     }
     let n = if quick { 8 } else { 16 };
+    lace(n);
+    if open {
+        return;
+    }
     let size = Swatch::knit_size(n, n);
     let knit = |chart: &str, axis| Swatch::knit(&format!("\"knit\": \"{chart}\""), n, n, axis);
     let rib = run("rib 2x2, courses", knit("rib 2x2", 0), size[1], RIB);

@@ -17,10 +17,11 @@ static const char WEAVE[] =
     "  \"edges\": [[0, 1], [1, 2], [2, 3], [3, 0]]}],"
     " \"blend_regions\": [{\"panel\": \"p\", \"polygon\": [[-1, -1], [1, -1], [1, 1], [-1, 1]]}]}";
 
-/* 4 by 4 loops, 3 mm wide */
+/* 4 by 4 loops, 3 mm wide, the ends of the yarn not woven in */
 static const char GARTER[] =
     "{\"toile_garment\": 1, \"name\": \"garter\", \"edge_length\": 0.004,"
-    " \"fabrics\": [{\"name\": \"y\", \"yarns\": {\"preset\": \"jersey\", \"knit\": \"garter\"}}],"
+    " \"fabrics\": [{\"name\": \"y\", \"yarns\": {\"preset\": \"jersey\", \"knit\": \"garter\","
+    "  \"fastened\": false}}],"
     " \"panels\": [{\"name\": \"p\", \"fabric\": \"y\","
     "  \"vertices\": [[0, 0], [0.0132, 0], [0.0132, 0.012015], [0, 0.012015]],"
     "  \"edges\": [[0, 1], [1, 2], [2, 3], [3, 0]]}],"

@@ -74,7 +74,8 @@ fn run_writes_a_complete_summary_models_pattern_and_picture() {
     let folder = Folder::new("run");
     let scene = folder.write("scene.json", &scene().to_string());
     let out = folder.0.join("a/b");
-    let output = toile(&["run", path(&scene), "--out", path(&out), "--verify"]);
+    let more = ["--verify", "--picture-size", "320x200"];
+    let output = toile(&[&["run", path(&scene), "--out", path(&out)], &more[..]].concat());
     assert_eq!(code(&output), 0, "{}", text(&output.stderr));
     assert!(text(&output.stdout).contains("hanging"));
     let summary: Value =
@@ -123,7 +124,9 @@ fn run_writes_a_complete_summary_models_pattern_and_picture() {
     assert_eq!(lines("v "), summary["vertices"].as_u64().unwrap());
     assert_eq!(lines("f "), summary["triangles"].as_u64().unwrap());
     assert_eq!(&read("scene.glb")[..4], b"glTF");
-    assert_eq!(&read("picture.png")[1..4], b"PNG");
+    let picture = read("picture.png");
+    assert_eq!(&picture[1..4], b"PNG");
+    assert_eq!(picture[16..24], [0, 0, 1, 64, 0, 0, 0, 200], "320 by 200");
     assert_eq!(&read("garment.pc2")[..11], b"POINTCACHE2");
     assert!(text(&read("pattern.svg")).contains("<svg"));
 
@@ -370,6 +373,28 @@ fn picture_draws_model_files_and_names_what_it_cannot() {
     assert!(alone.starts_with(b"\x89PNG"));
     let with_body = draw("body.png", &["--body", path(&body), "--body-scale", "0.01"]);
     assert_ne!(alone, with_body, "the body is not drawn");
+    // width and height in the header, as in the PNG specification
+    let size =
+        |png: &[u8]| [16, 20].map(|at| u32::from_be_bytes(png[at..at + 4].try_into().unwrap()));
+    assert_eq!(size(&alone), [1200, 900]);
+    assert_eq!(size(&draw("small.png", &["--size", "320x200"])), [320, 200]);
+    for (wrong, exit) in [
+        ("320", 2),
+        ("320x-1", 2),
+        ("0x200", 1),
+        ("9999999x9999999", 1),
+    ] {
+        let out = folder.0.join("wrong.png");
+        let output = toile(&[
+            "picture",
+            path(&square),
+            "--out",
+            path(&out),
+            "--size",
+            wrong,
+        ]);
+        assert_eq!(code(&output), exit, "{}", text(&output.stderr));
+    }
 
     let out = folder.0.join("none.png");
     let points = folder.write("p.obj", "v 0 0 0\n");

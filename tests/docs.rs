@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-const PAGES: [&str; 9] = [
+const PAGES: [&str; 10] = [
     "README.md",
     "ARCHITECTURE.md",
     "CONTRIBUTING.md",
@@ -11,6 +11,7 @@ const PAGES: [&str; 9] = [
     "docs/benchmarks.md",
     "docs/fabric.md",
     "docs/fmi.md",
+    "docs/gallery.md",
     "docs/mixed.md",
     "docs/yarns.md",
 ];
@@ -137,11 +138,46 @@ fn every_path_named_in_the_pages_exists() {
         // links to files beside the page
         for link in prose.split("](").skip(1) {
             let target = link.split([')', '#']).next().unwrap_or_default();
-            if !target.is_empty() && !target.contains("://") && !exists(root, target) {
+            let beside = root.join(page).with_file_name(target).exists();
+            if !target.is_empty() && !target.contains("://") && !beside {
                 missing.push(format!("{page}: link to {target}"));
             }
         }
     }
     assert!(missing.is_empty(), "{}", missing.join("\n"));
     assert!(count > 10, "only {count} paths were found");
+}
+
+/// Each picture of the gallery stands below a command that makes it from a scene, which is accepted; all pictures are small.
+#[test]
+fn the_gallery_is_made_of_scenes_that_run() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let page = std::fs::read_to_string(root.join("docs/gallery.md")).expect("gallery");
+    let mut scenes = 0;
+    for part in page.split("\n## ").skip(1) {
+        let command = part
+            .lines()
+            .find(|l| l.starts_with("target/release/toile run"));
+        let Some(command) = command else {
+            // a plot of a benchmark
+            assert!(part.contains("cargo bench"), "{part}");
+            continue;
+        };
+        let path = command.split_whitespace().nth(2).expect("scene");
+        let name = path
+            .trim_start_matches("examples/")
+            .trim_end_matches(".json");
+        assert!(part.contains(&format!("](images/{name}.png)")), "{part}");
+        let text = std::fs::read_to_string(root.join(path)).expect("scene");
+        let scene = toile::scene::Scene::from_json(&text, Some(&root.join("examples")));
+        let sim = toile::sim_scene::build(&scene.expect("scene")).expect("sim");
+        assert!(sim.yarns().is_some(), "{path}");
+        scenes += 1;
+    }
+    assert!(scenes >= 9, "{scenes}");
+    for entry in std::fs::read_dir(root.join("docs/images")).expect("images") {
+        let entry = entry.expect("image");
+        let bytes = entry.metadata().expect("size").len();
+        assert!(bytes < 200_000, "{:?}: {bytes} bytes", entry.path());
+    }
 }

@@ -6,6 +6,7 @@ use crate::yarn_sims::{WHOLE, knit, patch, sim};
 use std::sync::Arc;
 use toile::math::Vec3;
 use toile::math::parallel::Workers;
+use toile::pattern::export::garment_to_json;
 use toile::pattern::import::garment_from_json;
 use toile::scene::Scene;
 use toile::sim::{DrapeOptions, Sim, YarnChanges};
@@ -20,6 +21,11 @@ use toile::yarn::{Layout, Topology, YarnMaterial, YarnMesh, Yarns, lay};
 
 const PLAIN: &str = r#"{"weave": "plain", "warp_pitch": 0.001, "radius": 0.00025}"#;
 const ROUGH: (&str, f64) = ("solver.newton.relative_tolerance", 1e-3);
+
+/// Balanced garter of so many loops each way, the ends of its yarn not woven in.
+fn loose_garter(loops: usize) -> String {
+    knit("garter", loops).replace("\"knit\"", "\"fastened\": false, \"knit\"")
+}
 
 /// Length of all yarns [m].
 fn length(mesh: &YarnMesh, u: &[f64]) -> Vec<f64> {
@@ -114,7 +120,7 @@ fn a_weft_that_is_pulled_out_rubs_less_with_every_contact_that_it_leaves() {
 /// one by one, each off its four contacts, and no other contact of the patch lets go.
 #[test]
 fn pulling_the_yarn_of_garter_unravels_one_row() {
-    let mut sim = sim(&knit("garter", 5), 0.0, &[ROUGH]);
+    let mut sim = sim(&loose_garter(5), 0.0, &[ROUGH]);
     let laid = sim.yarns().unwrap().clone();
     let before = length(&laid, sim.yarn_coordinates());
     let low = laid.uv.iter().fold(f64::MAX, |m, p| m.min(p.y));
@@ -280,11 +286,28 @@ fn total(yarns: &Yarns, state: &State) -> Vec3 {
     all.map(|y| momentum(yarns, y, first, state)).sum()
 }
 
+/// The yarn of a knit whose ends are woven in holds all loops; if they are not, its end and the loops before it come out.
+#[test]
+fn ends_that_are_woven_in_hold_their_loops() {
+    for (fastened, comes) in [(true, false), (false, true)] {
+        let yarns = format!(r#"{{"preset": "jersey", "fastened": {fastened}}}"#);
+        let garment = garment_from_json(&patch(&yarns, 0.015, 0.015, WHOLE), None).unwrap();
+        let back = garment_to_json(&garment).unwrap();
+        assert_eq!(garment_from_json(&back, None).unwrap(), garment);
+        let mesh = lay(&garment, &Layout::default()).unwrap();
+        let list = passings(&mesh);
+        let any = |f: fn(&Passing) -> bool| list.iter().any(f);
+        assert_eq!(any(|p| matches!(p, Passing::End(_))), comes);
+        assert_eq!(any(|p| *p == Passing::Loop), comes);
+        assert!(any(|p| matches!(p, Passing::Lone(_))));
+    }
+}
+
 /// Length, mass and linear momentum of every yarn are what they were when an end slips out of its contact, when a
 /// contact passes a node of one yarn, and when a loop comes out.
 #[test]
 fn what_comes_off_keeps_length_and_momentum() {
-    let jersey = r#"{"preset": "jersey"}"#;
+    let jersey = r#"{"preset": "jersey", "fastened": false}"#;
     for (fabric, wanted, lost, split) in [
         (PLAIN, Passing::End(1), 1, 0),
         (jersey, Passing::Lone(1), 1, 0),
@@ -345,7 +368,7 @@ fn held_contacts_stay() {
 fn unravelled_states_go_on_bit_by_bit() {
     let start = |threads: f64| {
         let numbers = [ROUGH, ("solver.threads", threads)];
-        let mut sim = sim(&knit("garter", 4), 0.0, &numbers);
+        let mut sim = sim(&loose_garter(4), 0.0, &numbers);
         let mesh = sim.yarns().unwrap().clone();
         let low = mesh.uv.iter().fold(f64::MAX, |m, p| m.min(p.y));
         let held: Vec<u32> = (0..)
@@ -411,7 +434,7 @@ fn unravelled_states_go_on_bit_by_bit() {
 /// A topology that cannot be is refused, whatever it says.
 #[test]
 fn topologies_that_cannot_be_are_refused() {
-    let garment = garment_from_json(&knit("garter", 4), None).unwrap();
+    let garment = garment_from_json(&loose_garter(4), None).unwrap();
     let mesh = lay(&garment, &Layout::default()).unwrap();
     let (nodes, count) = (mesh.uv.len() as u32, mesh.incidences.len() as u32);
     let yarns = Yarns::laid(mesh, vec![YarnMaterial::default()]);

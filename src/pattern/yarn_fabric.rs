@@ -104,6 +104,9 @@ pub struct YarnFabric {
     pub damping_stiffness: f64,
     /// Whether it is laid with the distances of yarns at which it is at rest.
     pub compensated: bool,
+    /// Whether the ends of a knitted piece's yarn are woven in: it does not slide at its last contacts. Ends at which it
+    /// has been cut are free.
+    pub fastened: bool,
 }
 
 /// Weaves known by name.
@@ -268,6 +271,7 @@ impl YarnFabric {
             damping_mass: 2.0,
             damping_stiffness: 0.01,
             compensated: false,
+            fastened: true,
         };
         fabric.derive();
         fabric

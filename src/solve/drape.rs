@@ -1,7 +1,7 @@
 //! Static drape: coarse levels, the unfolding of a tangle, and rest; sewing is in `sew`.
 
 use super::engine::Engine;
-use super::relax::{End, RelaxOptions, Relaxed, holds, relax};
+use super::relax::{End, FAR, RelaxOptions, Relaxed, holds, pin_part, relax};
 use super::rest::{self, Rest};
 use super::sew::{NEARLY_CLOSED, sew};
 use super::step::{Totals, step};
@@ -134,8 +134,9 @@ pub fn drape(
         }
     }
     let small = engine.system.block_count() <= rest::LARGEST;
+    let near = pin_part(engine, state, FAR) == 1.0;
     let mut reached = Rest::None;
-    if small && !flat && !open && !crumpled {
+    if small && near && !flat && !open && !crumpled {
         let mut watch = |residual| watch(REST.0, "rest", residual);
         reached = rest::settle(engine, state, plan, &mut all.totals, &mut watch)?;
     }

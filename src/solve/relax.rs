@@ -66,11 +66,27 @@ const SETTLED: u64 = 30;
 
 /// Least part of their way by which pins are moved at once.
 const LEAST_PART: f64 = 1e-3;
+/// Way of pins, over the length of a segment of yarn, from which they go in parts and wait.
+pub(super) const FAR: f64 = 2.0;
+/// Way of pins in one correction over the length of a segment of yarn: what is beside them is left behind.
+const PIN_WAY: f64 = 0.5;
+/// Residual over the stiffness of yarn, as a strain, below which pins go on.
+const PIN_STRAIN: f64 = 1e-2;
 
 /// Whether pins are where they are to be.
 pub(super) fn holds(state: &State) -> bool {
     let there = |p: &Pin| state.positions[p.vertex as usize] == p.target;
     state.pins.iter().all(there)
+}
+
+/// Part of their way that pins may go at once where segments of yarn bear `most` times their length.
+pub(super) fn pin_part(engine: &Engine, state: &State, most: f64) -> f64 {
+    let Some(segment) = engine.system.mean_segment() else {
+        return 1.0;
+    };
+    let way = |p: &Pin| (p.target - state.positions[p.vertex as usize]).norm();
+    let longest = state.pins.iter().map(way).fold(0.0, f64::max);
+    (most * segment / longest).min(1.0)
 }
 
 /// Relaxes the state towards rest. `watch(step, residual)` returns false to stop.
@@ -93,15 +109,23 @@ pub fn relax(
         disturb(state, IMPERFECTION * engine.system.mean_edge());
     }
     // what is held may have to be moved in parts, so that nothing passes through what is near it
-    let mut part = 1.0;
+    let mut part = 1.0_f64;
+    let mut waits = false;
+    let near = PIN_STRAIN * engine.system.yarn_stiffness();
+    let far = pin_part(engine, state, FAR) < 1.0;
     while out.totals.substeps < options.max_steps {
+        if far {
+            part = part.min(pin_part(engine, state, PIN_WAY));
+        }
+        // pins wait for the yarns beside them
+        let fraction = if waits { 0.0 } else { part };
         let exact = pace.exactness(engine);
         // near rest friction is frozen while Newton's method converges: anchors that move after
         // every correction would creep
         let follow = out.totals.residual > FREEZE * options.force_tolerance
             && (out.totals.substeps < SETTLED || out.totals.substeps.is_multiple_of(10));
         let motion = Motion::Relax { exact, follow };
-        let (summary, reason) = match engine.attempt(state, h, part, motion) {
+        let (summary, reason) = match engine.attempt(state, h, fraction, motion) {
             Ok(Attempt::Accepted(summary)) => (summary, None),
             Ok(Attempt::Rejected(reason, summary)) => (summary, Some(reason)),
             Err(e) if matches!(e.status, Status::NoAdmissibleState | Status::LinearSolve) => {
@@ -115,7 +139,7 @@ pub fn relax(
         if let Some(reason) = reason {
             out.totals.cut = true;
             pace.refused(state);
-            if !holds(state) && part > LEAST_PART {
+            if !waits && !holds(state) && part > LEAST_PART {
                 part *= 0.5;
                 continue;
             }
@@ -138,6 +162,7 @@ pub fn relax(
         out.totals.substeps += 1;
         out.totals.residual = summary.static_residual;
         part = (2.0 * part).min(1.0);
+        waits = far && summary.static_residual > near;
         // short steps that are taken do lead on: only refused ones may end the relaxation
         h = pace.taken(engine, state, &summary, h);
         h = h.clamp(SMALLEST_STEP, options.largest_step);

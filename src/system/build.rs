@@ -314,14 +314,25 @@ impl System {
 
     /// Mean rest length of the edges, of the yarns' segments where there are no triangles [m].
     pub fn mean_edge(&self) -> f64 {
-        if let (true, Some(yarns)) = (self.edges.is_empty(), &self.yarns) {
-            let mesh = &yarns.mesh;
-            let length: f64 = (0..mesh.yarn_count())
-                .filter_map(|y| Some(mesh.yarn(y).last()?.u - mesh.yarn(y).first()?.u))
-                .sum();
-            return length / (mesh.incidences.len() - mesh.yarn_count()).max(1) as f64;
+        match self.mean_segment() {
+            Some(length) if self.edges.is_empty() => length,
+            _ => self.rest_lengths.iter().sum::<f64>() / self.rest_lengths.len().max(1) as f64,
         }
-        self.rest_lengths.iter().sum::<f64>() / self.rest_lengths.len().max(1) as f64
+    }
+
+    /// Mean laid length of the yarns' segments [m].
+    pub fn mean_segment(&self) -> Option<f64> {
+        let mesh = &self.yarns.as_ref()?.mesh;
+        let length: f64 = (0..mesh.yarn_count())
+            .filter_map(|y| Some(mesh.yarn(y).last()?.u - mesh.yarn(y).first()?.u))
+            .sum();
+        Some(length / (mesh.incidences.len() - mesh.yarn_count()).max(1) as f64)
+    }
+
+    /// Least force that would stretch a yarn to twice its length, without end where there is none [N].
+    pub fn yarn_stiffness(&self) -> f64 {
+        let materials = self.yarns.iter().flat_map(|y| &y.materials);
+        materials.map(|m| m.stretch).fold(f64::INFINITY, f64::min)
     }
 
     /// Largest change of an edge's relative length between two configurations, with a vertex of that edge.

@@ -166,16 +166,8 @@ pub fn lay(garment: &Garment, layout: &Layout<'_>) -> Result<YarnMesh> {
                 );
             }
             Structure::Knitted(knit) => {
-                stitch::lay(
-                    &mut builder,
-                    region,
-                    knit,
-                    yarns.radius,
-                    &cell,
-                    index,
-                    panel,
-                )
-                .map_err(place)?;
+                stitch::lay(&mut builder, region, knit, yarns, &cell, index, panel)
+                    .map_err(place)?;
             }
         }
         if builder.mesh.yarn_count() == before {

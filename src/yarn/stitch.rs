@@ -12,7 +12,8 @@
 //! which gives 1 for the left contact of a knit stitch, -1 for the right one, and the opposite for
 //! purl. A wrap is left out if a wing is missing, or if both wings lie on one side of the axis or on the
 //! axis: its angle would begin at a half turn (at cast-on and bind-off). Every strand has a spring of
-//! its length inside of the contact.
+//! its length inside of the contact. Where the yarn of a piece ends uncut, and its ends are woven in, it does
+//! not slide at its last contact.
 
 use super::builder::{Builder, EdgeNode};
 use super::cut::cut;
@@ -26,7 +27,7 @@ use crate::error::Result;
 use crate::math::Vec2;
 use crate::math::geometry::cross2;
 use crate::math::hash::Hash;
-use crate::pattern::yarn_fabric::Knit;
+use crate::pattern::yarn_fabric::{Knit, YarnFabric};
 
 /// Height of the disturbance over the loop width.
 const LIFT: f64 = 0.01;
@@ -54,7 +55,7 @@ pub(super) fn lay(
     builder: &mut Builder,
     region: &Region,
     knit: &Knit,
-    radius: f64,
+    yarns: &YarnFabric,
     cell: &Cell,
     fabric: u32,
     panel: u32,
@@ -116,7 +117,7 @@ pub(super) fn lay(
                         });
                     } else {
                         let changes = last.front != passage.front;
-                        let spacing = spacing(radius, changes, [at, incidence], du);
+                        let spacing = spacing(yarns.radius, changes, [at, incidence], du);
                         builder.mesh.spacings.push(spacing);
                     }
                 }
@@ -128,6 +129,16 @@ pub(super) fn lay(
         let end = builder.yarn_start();
         for strand in &mut strands[from..] {
             strand.yarn[1] = end;
+        }
+        if let [a, ..] = strands[from..]
+            && let [.., b] = strands[from..]
+        {
+            let contacts = [a.at[0].min(a.at[1]), b.at[0].max(b.at[1])];
+            for (rim, contact) in part.ends.iter().zip(contacts) {
+                if yarns.fastened && rim.is_none() {
+                    builder.mesh.incidences[contact as usize].slides = false;
+                }
+            }
         }
     }
     strands.sort_by_key(|s| (s.contact, !s.new, s.at[0]));

@@ -1,5 +1,7 @@
 //! Stretch tests of fabrics of yarns: a rectangle held at two opposite edges and pulled, in equilibrium at every length.
 
+pub(crate) mod lace;
+
 use toile::pattern::import::garment_from_json;
 use toile::sim::{DrapeOptions, Outcome, Sim, SimOptions};
 

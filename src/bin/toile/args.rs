@@ -70,6 +70,9 @@ pub(crate) enum Command {
         /// PNG file to write.
         #[arg(long, value_name = "PNG")]
         out: PathBuf,
+        /// Width and height of the picture [pixel].
+        #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size)]
+        size: Option<[usize; 2]>,
     },
 }
 
@@ -133,6 +136,9 @@ pub(crate) struct RunArgs {
     /// Neither progress nor table.
     #[arg(long)]
     pub(crate) quiet: bool,
+    /// Width and height of the picture [pixel].
+    #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size)]
+    pub(crate) picture_size: Option<[usize; 2]>,
     /// Simulates one further second and reports the largest motion in it.
     #[arg(long)]
     pub(crate) verify: bool,
@@ -173,6 +179,14 @@ fn offset(text: &str) -> Result<[f64; 3], String> {
     numbers
         .and_then(|n| n.try_into().ok())
         .ok_or_else(|| format!("'{text}' is not X,Y,Z: three numbers"))
+}
+
+fn size(text: &str) -> Result<[usize; 2], String> {
+    let numbers = text.split_once('x').map(|(w, h)| [w.parse(), h.parse()]);
+    match numbers {
+        Some([Ok(width), Ok(height)]) => Ok([width, height]),
+        _ => Err(format!("'{text}' is not WIDTHxHEIGHT, such as 800x600")),
+    }
 }
 
 fn library(text: &str) -> Result<(String, PathBuf), String> {

@@ -50,7 +50,8 @@ fn main() -> ExitCode {
             body,
             body_scale,
             out,
-        } => picture::picture(garment, body, *body_scale, out),
+            size,
+        } => picture::picture(garment, body, *body_scale, out, *size),
     };
     match result {
         Ok(code) => code,

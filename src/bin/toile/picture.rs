@@ -8,7 +8,22 @@ use toile::error::Error;
 use toile::readout::Part;
 use toile::readout::picture::{PictureOptions, render};
 
-pub(crate) fn picture(garment: &Path, bodies: &[PathBuf], scale: f64, out: &Path) -> Done {
+/// Options for a picture of this width and height, if they were given [pixel].
+pub(crate) fn sized(size: Option<[usize; 2]>) -> PictureOptions {
+    let mut options = PictureOptions::default();
+    if let Some([width, height]) = size {
+        (options.width, options.height) = (width, height);
+    }
+    options
+}
+
+pub(crate) fn picture(
+    garment: &Path,
+    bodies: &[PathBuf],
+    scale: f64,
+    out: &Path,
+    size: Option<[usize; 2]>,
+) -> Done {
     let (positions, triangles) = read_obj(garment, 1.0)?;
     if triangles.is_empty() {
         return Err(Failure::from(Error::geometry(format!(
@@ -22,7 +37,7 @@ pub(crate) fn picture(garment: &Path, bodies: &[PathBuf], scale: f64, out: &Path
         let (positions, triangles) = read_obj(path, scale)?;
         parts.push(Part::body(&path.to_string_lossy(), positions, triangles));
     }
-    render(&parts, &PictureOptions::default())?
+    render(&parts, &sized(size))?
         .write_png(out)
         .map_err(not_written)?;
     Ok(ExitCode::SUCCESS)

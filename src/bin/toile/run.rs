@@ -3,9 +3,9 @@
 use crate::args::RunArgs;
 use crate::info::load;
 use crate::output::{Done, Failure, file, not_written, out};
+use crate::picture::sized;
 use crate::summary::{Summary, table};
 use indicatif::{ProgressBar, ProgressStyle};
-use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 use toile::error::Error;
@@ -119,7 +119,7 @@ pub(crate) fn run(args: &RunArgs) -> Done {
     summary.wall_seconds = start.elapsed().as_secs_f64();
     summary.simulated_seconds = sim.time() - origin;
     summary.measure_memory();
-    write(&args.out, &scene, &sim, &frames, &mut summary)?;
+    write(args, &scene, &sim, &frames, &mut summary)?;
     if args.verify {
         summary.further_second_motion = Some(further_second(&mut sim)?);
     }
@@ -176,12 +176,13 @@ fn further_second(sim: &mut Sim) -> Result<f64, Error> {
 
 /// Model files, picture, pattern, state; counts of what crosses bodies go into the summary.
 fn write(
-    dir: &Path,
+    args: &RunArgs,
     scene: &Scene,
     sim: &Sim,
     frames: &Frames,
     summary: &mut Summary,
 ) -> Result<(), Failure> {
+    let dir = &args.out;
     let names: Vec<&str> = scene
         .garment
         .panels
@@ -236,7 +237,7 @@ fn write(
     let options = PictureOptions {
         // up is against gravity; without gravity it is y
         up: up.try_normalize(1e-9).unwrap_or_else(Vec3::y),
-        ..PictureOptions::default()
+        ..sized(args.picture_size)
     };
     let options = if options.up.cross(&options.front).norm() < 1e-3 {
         PictureOptions {

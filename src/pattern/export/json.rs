@@ -179,6 +179,9 @@ fn yarns_value(yarns: &YarnFabric) -> Result<Value> {
     if yarns.compensated {
         value.insert("compensated".into(), json!(true));
     }
+    if !yarns.fastened {
+        value.insert("fastened".into(), json!(false));
+    }
     Ok(Value::Object(value))
 }
 

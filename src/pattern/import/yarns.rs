@@ -151,6 +151,13 @@ pub const YARNS: &[Key] = &[
         "false",
         "whether yarns are laid at the distances that they have when the fabric is at rest",
     ),
+    key(
+        "fastened",
+        "boolean",
+        "",
+        "true",
+        "whether the ends of a knitted piece's yarn are woven in, so that it does not unravel; ends at which it has been cut are free",
+    ),
 ];
 
 /// Reads a fabric's yarns; `Fabric::check` judges the numbers.
@@ -197,6 +204,7 @@ pub(super) fn read_yarns(node: &Node<'_>) -> Result<YarnFabric> {
         yarns.damping_stiffness = damping.number_or("stiffness", yarns.damping_stiffness)?;
     }
     yarns.compensated = object.boolean_or("compensated", yarns.compensated)?;
+    yarns.fastened = object.boolean_or("fastened", yarns.fastened)?;
     Ok(yarns)
 }
 

@@ -141,13 +141,13 @@ impl<'a> Passages<'a> {
             && self.partners(i, group).all(neighbours)
     }
 
-    /// Whether no more than one contact lies between two contacts of a yarn and one of its ends.
+    /// Whether no more than one contact lies between two contacts of a yarn and one of its ends, and the yarn slides there.
     fn is_last(&self, i: usize, j: usize) -> bool {
         [(i.min(j), -1), (i.max(j), 1)]
             .into_iter()
-            .any(|(from, step)| {
-                let outer = self.next(from, step, true);
-                outer.and_then(|o| self.next(o, step, true)).is_none()
+            .any(|(from, step)| match self.next(from, step, true) {
+                Some(outer) => self.slides(outer) && self.next(outer, step, true).is_none(),
+                None => true,
             })
     }
 
