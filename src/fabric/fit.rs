@@ -9,11 +9,13 @@
 //! W ~ M kappa + 1/2 B kappa^2 = 1/2 B (kappa - kappa0)^2 - const,   kappa0 = -M/B
 //! ```
 //!
-//! by least squares of the errors over `W`, so that small strains count like large ones. In bending tests the width across is
+//! by least squares of the errors over `W`, so that small strains count like large ones. A fabric that this does not follow has
+//! ridges as well ([`ridges`](super::ridges)). The stress at rest is left out, of `W` too: a knit held square has one of shear. In bending tests the width across is
 //! that at rest and the length is free. What the fit leaves is told as an error of energy. SI units.
 
 use super::cell::PeriodicCell;
 use super::rest::{Rest, rest, sized};
+use super::ridges::{Ridged, ridged};
 use crate::error::{Error, Result};
 use crate::pattern::Fabric;
 use crate::pattern::yarn_fabric::{Structure, YarnFabric};
@@ -24,8 +26,10 @@ use nalgebra::{Matrix2, Matrix3x2, Matrix4, Vector2, Vector3, Vector4};
 const FORCE: f64 = 1e-9;
 /// Least weight of an energy, over the largest.
 const LEAST: f64 = 1e-6;
+/// Error of energy, root mean square, above which a fabric gets ridges.
+const FOLLOWS: f64 = 0.02;
 /// Least stiffness of a fit over its largest: a material must be positive definite.
-const FLOOR: f64 = 1e-4;
+pub(super) const FLOOR: f64 = 1e-4;
 
 /// Largest strains and curvatures of the tests, and how many steps lead there.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,15 +48,15 @@ impl Range {
     /// What suits a fabric: yarns of a weave are stretched at once, loops of a knit give way first.
     pub fn of(fabric: &YarnFabric) -> Self {
         let [a, b] = fabric.structure.pitch();
-        let stretch = match fabric.structure {
-            Structure::Woven(_) => 0.01,
-            Structure::Knitted(_) => 0.1,
+        let (stretch, steps) = match fabric.structure {
+            Structure::Woven(_) => (0.01, 4),
+            Structure::Knitted(_) => (0.1, 20),
         };
         Self {
             stretch,
             shear: 0.1,
             curvature: 0.15 / a.max(b),
-            steps: 4,
+            steps,
         }
     }
 }
@@ -76,7 +80,7 @@ pub struct Sample {
     pub test: usize,
     /// `(E11, E22, 2 E12)`.
     pub strain: Vector3<f64>,
-    /// `W` [J/m^2].
+    /// `W`, less the work of the stress at rest [J/m^2].
     pub energy: f64,
     /// Second Piola-Kirchhoff stress `(S11, S22, S12)`, less that at rest [N/m].
     pub stress: Vector3<f64>,
@@ -122,10 +126,12 @@ pub struct Fit {
     pub samples: Vec<Sample>,
     /// Tests of bending.
     pub bent: Vec<BentSample>,
-    /// `(weft, coupling, warp, shear)` [N/m].
+    /// `(weft, coupling, warp, shear)` without ridges [N/m].
     pub membrane: [f64; 4],
-    /// Root mean square and largest error of the membrane's energy, each over the yarns'.
+    /// Root mean square and largest error of its energy, each over the yarns'.
     pub errors: [f64; 2],
+    /// The membrane with ridges, where the one without does not follow the yarns.
+    pub ridged: Option<Ridged>,
     /// Bending that curves the weft, the warp.
     pub bending: [Bending; 2],
     /// Corrections of everything inside that all tests took.
@@ -184,7 +190,7 @@ pub fn fit(fabric: &YarnFabric, range: &Range, settings: &Settings) -> Result<Fi
             samples.push(Sample {
                 test,
                 strain,
-                energy: (cell.energy()? - start.0) / area,
+                energy: (cell.energy()? - start.0) / area - start.1.dot(&strain),
                 stress: second(&mut cell, at_rest.factors)? - start.1,
             });
         }
@@ -209,7 +215,11 @@ pub fn fit(fabric: &YarnFabric, range: &Range, settings: &Settings) -> Result<Fi
     }
     let membrane = membrane(&samples)?;
     let errors = errors(&samples, |e| energy(&membrane, e));
+    let ridged = (errors[0] > FOLLOWS)
+        .then(|| ridged(&samples, &membrane, range))
+        .transpose()?;
     Ok(Fit {
+        ridged,
         rest: at_rest,
         density: cell.density() / area,
         membrane,
@@ -249,7 +259,7 @@ fn second(cell: &mut PeriodicCell, factors: [f64; 2]) -> Result<Vector3<f64>> {
 }
 
 /// Weights of least squares: one over each energy.
-fn weights(energies: impl Iterator<Item = f64> + Clone) -> Vec<f64> {
+pub(super) fn weights(energies: impl Iterator<Item = f64> + Clone) -> Vec<f64> {
     let largest = energies.clone().map(f64::abs).fold(0.0, f64::max);
     energies
         .map(|w| 1.0 / w.abs().max(LEAST * largest))
@@ -329,15 +339,25 @@ fn bending(samples: &[BentSample], axis: usize) -> Result<Bending> {
 }
 
 impl Fit {
+    /// `W` of the triangles' membrane [J/m^2].
+    pub fn energy(&self, strain: &Vector3<f64>) -> f64 {
+        let without = || energy(&self.membrane, strain);
+        self.ridged
+            .as_ref()
+            .map_or_else(without, |r| r.energy(strain))
+    }
+
     /// A fabric with this material, everything else as it was.
     pub fn fabric(&self, like: &Fabric) -> Fabric {
-        let [weft, coupling, warp, shear] = self.membrane;
+        let ridged = self.ridged.as_ref();
+        let [weft, coupling, warp, shear] = ridged.map_or(self.membrane, |r| r.membrane);
         Fabric {
             density: self.density,
             weft,
             coupling,
             warp,
             shear,
+            ridges: ridged.map_or_else(Vec::new, |r| r.ridges.clone()),
             bending_weft: self.bending[0].rigidity,
             bending_warp: self.bending[1].rigidity,
             ..like.clone()

@@ -2,6 +2,8 @@
 
 pub mod cell;
 pub mod fit;
+mod nonnegative;
 pub mod rest;
+pub mod ridges;
 
 pub use cell::PeriodicCell;

@@ -1,6 +1,6 @@
 //! What a fabric is: areal density, membrane and bending stiffness, damping, thickness, friction.
 
-use super::YarnFabric;
+use super::{Ridge, YarnFabric};
 use crate::error::{Error, Result};
 
 /// Which bending energy a fabric uses.
@@ -16,7 +16,7 @@ pub enum BendingModel {
 /// Numbers of one fabric, SI units.
 ///
 /// Membrane energy per rest area, Green strain `E` in the (weft, warp) frame:
-/// `1/2 (weft E11^2 + 2 coupling E11 E22 + warp E22^2 + shear (2 E12)^2)`.
+/// `1/2 (weft E11^2 + 2 coupling E11 E22 + warp E22^2 + shear (2 E12)^2)`, and that of the ridges ([`Ridge`]).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fabric {
     /// Name by which panels ask for it.
@@ -31,6 +31,8 @@ pub struct Fabric {
     pub coupling: f64,
     /// Shear stiffness, force per length per shear angle [N/m].
     pub shear: f64,
+    /// What the membrane has beside these: none where stiffness does not depend on strain.
+    pub ridges: Vec<Ridge>,
     /// Flexural rigidity per width for bending that curves the warp [N m].
     pub bending_warp: f64,
     /// Flexural rigidity per width for bending that curves the weft [N m].
@@ -58,6 +60,7 @@ impl Default for Fabric {
             weft: 1000.0,
             coupling: 0.0,
             shear: 200.0,
+            ridges: Vec::new(),
             bending_warp: 1e-5,
             bending_weft: 1e-5,
             bending_model: BendingModel::Hinge,
@@ -70,7 +73,19 @@ impl Default for Fabric {
     }
 }
 
+/// Most ridges of a fabric.
+const MAX_RIDGES: usize = 100;
+
 impl Fabric {
+    /// Stiffness without strain along weft and warp [N/m].
+    pub fn along(&self) -> [f64; 2] {
+        let ridges = |k: usize| -> f64 {
+            let part = |r: &Ridge| r.at(0.0).stiffness * r.direction()[k].powi(2);
+            self.ridges.iter().map(part).sum()
+        };
+        [self.weft + ridges(0), self.warp + ridges(1)]
+    }
+
     /// Refuses numbers that are not finite, signs that cannot be, and a membrane that is not
     /// positive definite (`coupling^2 < warp * weft`).
     pub fn check(&self) -> Result<()> {
@@ -110,6 +125,13 @@ impl Fabric {
                 self.coupling,
                 "below sqrt(warp weft) in size",
             );
+        }
+        if self.ridges.len() > MAX_RIDGES {
+            return Err(Error::material(format!(
+                "fabric '{}': {} ridges, at most {MAX_RIDGES}",
+                self.name,
+                self.ridges.len()
+            )));
         }
         self.yarns.as_ref().map_or(Ok(()), |yarns| {
             yarns

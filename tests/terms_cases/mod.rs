@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 use toile::cloth::Cloth;
 use toile::math::geometry::hinges;
 use toile::math::{Mat3, Rotation, Vec2, Vec3};
-use toile::pattern::{BendingModel, Fabric, Garment};
+use toile::pattern::{BendingModel, Fabric, Garment, Ridge};
 use toile::system::air::Air;
 use toile::system::gravity::Gravity;
 use toile::system::hinge::Hinge;
@@ -19,6 +19,19 @@ use toile::system::term::{Configuration, HessianKind, MAX_ARITY, MAX_BLOCKS, Ter
 use toile::tri::{SeamLink, SeamMesh};
 
 pub const H: f64 = 0.02;
+
+/// Ridges in the plane and in shear, that stiffen, soften and vanish. The strain at rest is none of theirs: there third derivatives
+/// jump, and differences agree to first order only.
+fn ridges() -> Vec<Ridge> {
+    let ridge = |d: [f64; 3], strains: &[f64], stiffness: &[f64]| {
+        Ridge::new(d.into(), strains.to_vec(), stiffness.to_vec()).expect("valid ridge")
+    };
+    vec![
+        ridge([1.0, 1.0, 0.0], &[-0.2, 0.05, 0.4], &[100.0, 300.0, 2000.0]),
+        ridge([1.0, 0.0, 0.5], &[-0.02, 0.3], &[400.0, 0.0]),
+        ridge([0.0, 1.0, -0.5], &[-0.5, 0.1, 0.5], &[300.0, 0.0, 700.0]),
+    ]
+}
 
 pub fn fabrics() -> Vec<Fabric> {
     let hinge = Fabric {
@@ -34,6 +47,7 @@ pub fn fabrics() -> Vec<Fabric> {
     let quadratic = Fabric {
         bending_model: BendingModel::Quadratic,
         bending_weft: 5e-5,
+        ridges: ridges(),
         ..hinge.clone()
     };
     vec![hinge, quadratic]

@@ -5,7 +5,7 @@ use crate::output::{Done, Failure, file, out};
 use std::fmt::Write;
 use std::path::Path;
 use toile::error::Error;
-use toile::fabric::fit::{BentSample, Fit, Range, TESTS, energy, fit};
+use toile::fabric::fit::{BentSample, Fit, Range, TESTS, fit};
 use toile::pattern::export::fabric_to_json;
 use toile::pattern::import::fabric_from_json;
 use toile::readout::plot::{Curve, Plot};
@@ -74,6 +74,21 @@ fn table(fit: &Fit, range: &Range) -> String {
     ] {
         let _ = writeln!(text, "{name:<24} {value}");
     }
+    if let Some(ridged) = &fit.ridged {
+        let _ = writeln!(
+            text,
+            "{:<24} {} with {} strains; error of energy {:.2} % rms, {:.2} % largest",
+            "ridges",
+            ridged.ridges.len(),
+            ridged
+                .ridges
+                .iter()
+                .map(|r| r.strains().len())
+                .sum::<usize>(),
+            1e2 * ridged.errors[0],
+            1e2 * ridged.errors[1]
+        );
+    }
     for (name, bending) in
         [("bending.weft", 0), ("bending.warp", 1)].map(|(n, k)| (n, &fit.bending[k]))
     {
@@ -117,7 +132,7 @@ fn write(fit: &Fit, range: &Range, dir: &Path) -> Result<(), Failure> {
             let t = part(k, POINTS);
             let scale = [range.stretch, range.stretch, range.shear];
             let e = [0, 1, 2].map(|i| t * direction[i] * scale[i]);
-            [t, energy(&fit.membrane, &e.into())]
+            [t, fit.energy(&e.into())]
         };
         curves.push(Curve {
             name: format!("triangles: {name}"),
