@@ -1,7 +1,7 @@
 //! The triangles' material of a fabric, fitted to its yarns by tests on the periodic cell.
 //!
-//! The cell is brought to rest ([`rest`](super::rest)); from there it is stretched across, along, both ways, sheared, and both
-//! at once, in steps, with the contacts held where they slid to, so that there is one energy of the strain. With the Green
+//! The cell is brought to rest ([`rest`](super::rest)); from there it is stretched across, along and both ways, pressed together one way, also while
+//! it is stretched the other, sheared, and both at once, in steps, with the contacts held where they slid to, so that there is one energy of the strain. With the Green
 //! strain `E` against the size at rest and `W` per area at rest, less that at rest,
 //!
 //! ```text
@@ -22,8 +22,6 @@ use crate::pattern::yarn_fabric::{Structure, YarnFabric};
 use crate::solve::settings::Settings;
 use nalgebra::{Matrix2, Matrix3x2, Matrix4, Vector2, Vector3, Vector4};
 
-/// Force to which nodes come to rest in the tests [N].
-const FORCE: f64 = 1e-9;
 /// Least weight of an energy, over the largest.
 const LEAST: f64 = 1e-6;
 /// Error of energy, root mean square, above which a fabric gets ridges.
@@ -36,6 +34,9 @@ pub(super) const FLOOR: f64 = 1e-4;
 pub struct Range {
     /// Green strain `E11`, `E22`.
     pub stretch: f64,
+    /// Strain, without its sign, of a direction that is pressed together, alone or while the other is stretched; 0 for no such
+    /// tests.
+    pub press: f64,
     /// Shear strain `2 E12`.
     pub shear: f64,
     /// Curvature [1/m].
@@ -45,32 +46,58 @@ pub struct Range {
 }
 
 impl Range {
-    /// What suits a fabric: yarns of a weave are stretched at once, loops of a knit give way first.
+    /// What suits a fabric: yarns of a weave are stretched at once, loops of a knit give way first, by drawing in across.
+    /// A weave that is pressed together buckles as a sheet long before its yarns do between their crossings.
     pub fn of(fabric: &YarnFabric) -> Self {
         let [a, b] = fabric.structure.pitch();
-        let (stretch, steps) = match fabric.structure {
-            Structure::Woven(_) => (0.01, 4),
-            Structure::Knitted(_) => (0.1, 20),
+        let (stretch, press, steps) = match fabric.structure {
+            Structure::Woven(_) => (0.01, 0.0, 4),
+            Structure::Knitted(_) => (0.1, 0.1, 20),
         };
         Self {
             stretch,
+            press,
             shear: 0.1,
             curvature: 0.15 / a.max(b),
             steps,
         }
     }
+
+    /// Where a test ends.
+    pub fn end(&self, direction: &[f64; 3]) -> Vector3<f64> {
+        let plane = |d: f64| d * if d < 0.0 { self.press } else { self.stretch };
+        let [weft, warp, shear] = *direction;
+        Vector3::new(plane(weft), plane(warp), shear * self.shear)
+    }
 }
 
-/// A test: strains grow along a direction.
-pub const TESTS: [(&str, [f64; 3]); 8] = [
+/// A test: strains grow along a direction, over the largest of their range.
+pub const TESTS: [(&str, [f64; 3]); 25] = [
     ("weft", [1.0, 0.0, 0.0]),
     ("warp", [0.0, 1.0, 0.0]),
     ("both", [1.0, 1.0, 0.0]),
     ("weft, half warp", [1.0, 0.5, 0.0]),
+    ("warp, half weft", [0.5, 1.0, 0.0]),
+    ("weft pressed", [-1.0, 0.0, 0.0]),
+    ("warp pressed", [0.0, -1.0, 0.0]),
+    ("weft, less warp", [1.0, -1.0, 0.0]),
+    ("warp, less weft", [-1.0, 1.0, 0.0]),
+    ("weft, half less warp", [1.0, -0.5, 0.0]),
+    ("warp, half less weft", [-0.5, 1.0, 0.0]),
+    ("weft, quarter less warp", [1.0, -0.25, 0.0]),
+    ("warp, quarter less weft", [-0.25, 1.0, 0.0]),
     ("shear", [0.0, 0.0, 1.0]),
     ("shear back", [0.0, 0.0, -1.0]),
     ("weft and shear", [1.0, 0.0, 1.0]),
     ("warp and shear", [0.0, 1.0, 1.0]),
+    ("weft and shear back", [1.0, 0.0, -1.0]),
+    ("warp and shear back", [0.0, 1.0, -1.0]),
+    ("both and shear", [1.0, 1.0, 1.0]),
+    ("both and shear back", [1.0, 1.0, -1.0]),
+    ("weft, less warp, shear", [1.0, -1.0, 1.0]),
+    ("weft, less warp, shear back", [1.0, -1.0, -1.0]),
+    ("warp, less weft, shear", [-1.0, 1.0, 1.0]),
+    ("warp, less weft, shear back", [-1.0, 1.0, -1.0]),
 ];
 
 /// The cell at one strain.
@@ -153,6 +180,8 @@ pub fn fit(fabric: &YarnFabric, range: &Range, settings: &Settings) -> Result<Fi
     for (name, value, least, most) in [
         ("stretch", range.stretch, 1e-4, 1.0),
         ("shear", range.shear, 1e-4, 1.0),
+        // the area vanishes at 0.5
+        ("press", range.press, 0.0, 0.45),
         ("curvature", range.curvature, 1e-2, 1e5),
     ] {
         if !(least..=most).contains(&value) {
@@ -167,25 +196,25 @@ pub fn fit(fabric: &YarnFabric, range: &Range, settings: &Settings) -> Result<Fi
             range.steps
         )));
     }
-    let mut cell = PeriodicCell::new(fabric, [1, 1], settings)?;
+    let mut cell = PeriodicCell::one(fabric, settings)?;
     let at_rest = rest(&mut cell)?;
-    let mut corrections = at_rest.corrections + cell.relax(FORCE)?;
+    let mut corrections = at_rest.corrections + cell.relax(cell.nothing())?;
     let area: f64 = at_rest.factors.iter().product();
     let start = (cell.energy()?, second(&mut cell, at_rest.factors)?);
     let kept = cell.checkpoint();
     let mut samples = Vec::with_capacity(TESTS.len() * range.steps);
     for (test, (name, direction)) in TESTS.iter().enumerate() {
+        let end = range.end(direction);
+        if range.press == 0.0 && direction.iter().take(2).any(|d| *d < 0.0) {
+            continue;
+        }
         cell.roll_back(kept.clone());
         for step in 1..=range.steps {
             let part = step as f64 / range.steps as f64;
-            let strain = Vector3::new(
-                direction[0] * range.stretch,
-                direction[1] * range.stretch,
-                direction[2] * range.shear,
-            ) * part;
+            let strain = end * part;
             cell.stretch(&strained(at_rest.factors, &strain));
             corrections += cell
-                .relax(FORCE)
+                .relax(cell.nothing())
                 .map_err(|e| e.at(format!("{name}, strain {:?}", strain.as_slice())))?;
             samples.push(Sample {
                 test,
@@ -203,7 +232,7 @@ pub fn fit(fabric: &YarnFabric, range: &Range, settings: &Settings) -> Result<Fi
                 let curvature = side * range.curvature * step as f64 / range.steps as f64;
                 let mut test = cell.bent(axis, curvature)?;
                 corrections += test
-                    .relax(FORCE)
+                    .relax(test.nothing())
                     .map_err(|e| e.at(format!("curvature {curvature} 1/m")))?;
                 bent.push(BentSample {
                     axis,
@@ -360,6 +389,8 @@ impl Fit {
             ridges: ridged.map_or_else(Vec::new, |r| r.ridges.clone()),
             bending_weft: self.bending[0].rigidity,
             bending_warp: self.bending[1].rigidity,
+            curvature_weft: self.bending[0].rest(),
+            curvature_warp: self.bending[1].rest(),
             ..like.clone()
         }
     }

@@ -2,6 +2,8 @@
 
 pub mod cell;
 pub mod fit;
+pub mod fitted;
+mod known;
 mod nonnegative;
 pub mod rest;
 pub mod ridges;

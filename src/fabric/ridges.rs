@@ -19,17 +19,24 @@ use crate::pattern::Ridge;
 use nalgebra::{DMatrix, DVector, Vector3};
 
 /// Directions `(E11, E22, 2 E12)`, the last over the largest stretch and times the largest shear of the tests.
-const DIRECTIONS: [[f64; 3]; 10] = [
+const DIRECTIONS: [[f64; 3]; 17] = [
     [1.0, 0.0, 0.0],
     [0.0, 1.0, 0.0],
     [1.0, 1.0, 0.0],
     [1.0, 0.5, 0.0],
     [0.5, 1.0, 0.0],
+    [1.0, 0.75, 0.0],
+    [0.75, 1.0, 0.0],
+    [1.0, -1.0, 0.0],
+    [1.0, -0.5, 0.0],
+    [0.5, -1.0, 0.0],
     [0.0, 0.0, 1.0],
     [1.0, 0.0, 0.5],
     [1.0, 0.0, -0.5],
     [0.0, 1.0, 0.5],
     [0.0, 1.0, -0.5],
+    [1.0, 1.0, 0.5],
+    [1.0, 1.0, -0.5],
 ];
 /// Weight of an error of stress beside one of energy.
 const STRESS: f64 = 0.1;

@@ -37,6 +37,10 @@ pub struct Fabric {
     pub bending_warp: f64,
     /// Flexural rigidity per width for bending that curves the weft [N m].
     pub bending_weft: f64,
+    /// Curvature of the warp at rest, positive to the front, which is the panel's outside [1/m].
+    pub curvature_warp: f64,
+    /// Curvature of the weft at rest, positive to the front [1/m].
+    pub curvature_weft: f64,
     /// Bending energy used.
     pub bending_model: BendingModel,
     /// Mass-proportional damping [1/s].
@@ -49,6 +53,8 @@ pub struct Fabric {
     pub friction: f64,
     /// The yarns that it is made of, for panels whose every yarn is simulated.
     pub yarns: Option<YarnFabric>,
+    /// Whether density, membrane and bending of triangles are those fitted to the yarns, whatever stands here.
+    pub fitted: bool,
 }
 
 impl Default for Fabric {
@@ -63,16 +69,21 @@ impl Default for Fabric {
             ridges: Vec::new(),
             bending_warp: 1e-5,
             bending_weft: 1e-5,
+            curvature_warp: 0.0,
+            curvature_weft: 0.0,
             bending_model: BendingModel::Hinge,
             damping_mass: 0.0,
             damping_stiffness: 0.0,
             thickness: 1e-3,
             friction: 0.3,
             yarns: None,
+            fitted: false,
         }
     }
 }
 
+/// Largest curvature at rest [1/m].
+const MAX_CURVATURE: f64 = 1e5;
 /// Most ridges of a fabric.
 const MAX_RIDGES: usize = 100;
 
@@ -119,6 +130,21 @@ impl Fabric {
                 return refuse(key, value, "finite and not negative");
             }
         }
+        for (key, value) in [
+            ("bending.curvature_warp", self.curvature_warp),
+            ("bending.curvature_weft", self.curvature_weft),
+        ] {
+            if !(value.abs() <= MAX_CURVATURE) {
+                return refuse(key, value, &format!("at most {MAX_CURVATURE} 1/m in size"));
+            }
+            if value != 0.0 && self.bending_model == BendingModel::Quadratic {
+                return refuse(
+                    key,
+                    value,
+                    "0 with the quadratic model, which is flat at rest",
+                );
+            }
+        }
         if !self.coupling.is_finite() || self.coupling * self.coupling >= self.warp * self.weft {
             return refuse(
                 "membrane.coupling",
@@ -131,6 +157,12 @@ impl Fabric {
                 "fabric '{}': {} ridges, at most {MAX_RIDGES}",
                 self.name,
                 self.ridges.len()
+            )));
+        }
+        if self.fitted && self.yarns.is_none() {
+            return Err(Error::material(format!(
+                "fabric '{}': triangles fitted to yarns, and it has no yarns",
+                self.name
             )));
         }
         self.yarns.as_ref().map_or(Ok(()), |yarns| {

@@ -123,9 +123,20 @@ fn fabric_value(fabric: &Fabric) -> Result<Value> {
         "thickness": number(fabric.thickness)?,
         "friction": number(fabric.friction)?,
     });
+    for (key, curvature) in [
+        ("curvature_warp", fabric.curvature_warp),
+        ("curvature_weft", fabric.curvature_weft),
+    ] {
+        if curvature != 0.0 {
+            value["bending"][key] = number(curvature)?;
+        }
+    }
     if !fabric.ridges.is_empty() {
         let ridges = fabric.ridges.iter().map(ridge_value);
         value["ridges"] = ridges.collect::<Result<Value>>()?;
+    }
+    if fabric.fitted {
+        value["triangles"] = json!("fitted");
     }
     if let Some(yarns) = &fabric.yarns {
         value["yarns"] = yarns_value(yarns)?;

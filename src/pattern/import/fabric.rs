@@ -83,6 +83,8 @@ fn read_own(object: &Object<'_>) -> Result<Fabric> {
         bending.only(schema::BENDING)?;
         fabric.bending_warp = bending.number_or("warp", fabric.bending_warp)?;
         fabric.bending_weft = bending.number_or("weft", fabric.bending_weft)?;
+        fabric.curvature_warp = bending.number_or("curvature_warp", fabric.curvature_warp)?;
+        fabric.curvature_weft = bending.number_or("curvature_weft", fabric.curvature_weft)?;
         if let Some(model) = bending.get("model") {
             fabric.bending_model = match model.text()? {
                 "hinge" => BendingModel::Hinge,
@@ -100,6 +102,15 @@ fn read_own(object: &Object<'_>) -> Result<Fabric> {
         damping.only(schema::DAMPING)?;
         fabric.damping_mass = damping.number_or("mass", fabric.damping_mass)?;
         fabric.damping_stiffness = damping.number_or("stiffness", fabric.damping_stiffness)?;
+    }
+    if let Some(node) = object.get("triangles") {
+        fabric.fitted = match node.text()? {
+            "given" => false,
+            "fitted" => true,
+            other => {
+                return Err(node.error(format!("must be \"given\" or \"fitted\", is {other:?}")));
+            }
+        };
     }
     fabric.yarns = object.get("yarns").map(|n| read_yarns(&n)).transpose()?;
     Ok(fabric)

@@ -289,6 +289,13 @@ pub const FABRIC: &[Key] = &[
         "stiffness in the plane",
     ),
     key(
+        "triangles",
+        "text",
+        "",
+        "given",
+        "\"given\", or \"fitted\": density, membrane, ridges and bending are those fitted to the yarns when a simulation is made",
+    ),
+    key(
         "ridges",
         "array of ridges",
         "",
@@ -388,6 +395,14 @@ pub const BENDING: &[Key] = &[
         "1e-5",
         "rigidity per width against curving the weft",
     ),
+    key(
+        "curvature_warp",
+        "number",
+        "1/m",
+        "0",
+        "curvature of the warp at rest, positive to the front; hinges only",
+    ),
+    key("curvature_weft", "number", "1/m", "0", "same of the weft"),
     key(
         "model",
         "text",
