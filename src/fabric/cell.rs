@@ -20,7 +20,8 @@
 //! Its middle is free to move towards the axis and away from it, so that it is as long as it likes. `W` is per area of the
 //! flat layout. SI units.
 
-use crate::blend::{Coupling, Rider, Riders};
+use super::bend::{Bend, lattice, rider};
+use crate::blend::{Coupling, Riders};
 use crate::cloth::Cloth;
 use crate::error::{Error, Result};
 use crate::math::{Mat3, Vec2, Vec3};
@@ -38,7 +39,7 @@ use crate::tri::grid::rectangle;
 use crate::yarn::layout::{Layout, lay};
 use crate::yarn::periodic::NodeImage;
 use crate::yarn::{YarnMaterial, Yarns};
-use nalgebra::{Matrix3x2, Rotation3, Unit};
+use nalgebra::Matrix3x2;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -54,17 +55,6 @@ const STEPS: u64 = 4000;
 const NOTHING: f64 = 1e-5;
 /// First and largest step of a relaxation [s].
 const STEPS_IN_TIME: [f64; 2] = [0.01, 10.0];
-
-/// How a cell is bent.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Bend {
-    /// Direction of the layout that is curved.
-    axis: usize,
-    /// Curvature [1/m].
-    curvature: f64,
-    /// Deformation gradient before.
-    plane: Matrix3x2<f64>,
-}
 
 /// One repeat, or a few, of a fabric.
 pub struct PeriodicCell {
@@ -338,76 +328,6 @@ impl PeriodicCell {
 fn frame(f: &Matrix3x2<f64>) -> Mat3 {
     let [a, b]: [Vec3; 2] = [f.column(0).into(), f.column(1).into()];
     Mat3::from_columns(&[a, b, a.cross(&b).normalize()])
-}
-
-/// Repeats around a cylinder that images are away.
-const TURNS: [i32; 4] = [-2, -1, 1, 2];
-
-impl Bend {
-    /// A plane point on the cylinder.
-    fn apply(&self, x: &Vec3) -> Vec3 {
-        let radius = 1.0 / self.curvature;
-        let (sine, cosine) = (self.curvature * x[self.axis]).sin_cos();
-        let out = radius - x.z;
-        let mut y = *x;
-        y[self.axis] = out * sine;
-        y.z = radius - out * cosine;
-        y
-    }
-
-    /// Turn about the axis over `n` repeats of a cell of this size.
-    fn turn(&self, size: Vec2, n: i32) -> Mat3 {
-        let length = size[self.axis] * self.plane.column(self.axis).norm();
-        // the far end rises to the front
-        let about = if self.axis == 0 {
-            -Vec3::y()
-        } else {
-            Vec3::x()
-        };
-        let angle = f64::from(n) * self.curvature * length;
-        Rotation3::from_axis_angle(&Unit::new_unchecked(about), angle).into_inner()
-    }
-}
-
-/// Points of the lattice: its vectors, or of a bent cell the one along the axis and what the turns leave.
-fn lattice(size: Vec2, bend: Option<&Bend>) -> Vec<Vec3> {
-    let Some(bend) = bend else {
-        return vec![Vec3::x() * size.x, Vec3::y() * size.y];
-    };
-    let along = 1 - bend.axis;
-    let centre = Vec3::z() / bend.curvature;
-    let left = |n: &i32| (bend.turn(size, *n).transpose() - Mat3::identity()) * centre;
-    let mut out: Vec<Vec3> = vec![bend.plane.column(along) * size[along]];
-    out.extend(TURNS.iter().map(left));
-    out
-}
-
-/// What carries an image; `first` points are the lattice's.
-fn rider(image: &NodeImage, first: u32, size: Vec2, bend: Option<&Bend>) -> Result<Rider> {
-    let (point, of) = (first + image.node, first + image.of);
-    let [m, n] = image.steps.map(f64::from);
-    let Some(bend) = bend else {
-        return Ok(Rider {
-            point,
-            vertices: [of, 0, 1],
-            weights: [1.0, m, n],
-            turn: Mat3::identity(),
-        });
-    };
-    let around = image.steps[bend.axis];
-    let place = TURNS.iter().position(|t| *t == around);
-    if place.is_none() && around != 0 {
-        return Err(Error::material(format!(
-            "a bent cell has images {around} repeats away, at most 2 can be: take more repeats"
-        )));
-    }
-    let part = f64::from(u8::from(place.is_some()));
-    Ok(Rider {
-        point,
-        vertices: [of, 0, 1 + place.unwrap_or(0) as u32],
-        weights: [1.0, f64::from(image.steps[1 - bend.axis]), part],
-        turn: bend.turn(size, around),
-    })
 }
 
 fn engine(

@@ -1,5 +1,6 @@
 //! What a fabric of yarns is as a whole: its periodic cell, how it lies at rest, the triangles' material that is like it.
 
+mod bend;
 pub mod cell;
 pub mod fit;
 pub mod fitted;
