@@ -13,6 +13,7 @@ use crate::blend::Coupling;
 use crate::body::Body;
 use crate::cloth::Cloth;
 use crate::error::{Error, Result};
+use crate::fabric::fitted::fitted;
 use crate::math::Vec3;
 use crate::pattern::Garment;
 use crate::solve::engine::Engine;
@@ -88,6 +89,7 @@ impl Sim {
     pub fn from_mesh(garment: &Garment, mesh: GarmentMesh, options: &SimOptions) -> Result<Self> {
         let gravity = options.gravity.unwrap_or([0.0, -9.81, 0.0]);
         garment.check_geometry()?;
+        let garment = &*fitted(garment, &options.settings)?;
         finite("gravity", &gravity)?;
         finite("wind", &options.wind)?;
         finite("pressure", &[options.pressure])?;

@@ -5,7 +5,9 @@
 use crate::sheets::{Flat, NoBodies, PATTERNS, Pattern, mesh, panel, rectangle};
 use toile::cloth::Cloth;
 use toile::math::{Vec2, Vec3};
+use toile::pattern::import::garment_from_json;
 use toile::pattern::{BendingModel, Fabric, Garment};
+use toile::sim::{DrapeOptions, Outcome, Sim, SimOptions};
 use toile::system::gravity::Gravity;
 use toile::system::hinge::Hinge;
 use toile::system::membrane::Membrane;
@@ -317,5 +319,77 @@ fn a_heavy_strip_with_quadratic_bending_follows_the_elastica_on_every_mesh() {
 fn a_heavy_strip_at_a_finer_mesh() {
     for gamma in [1.0, 1000.0] {
         check_cantilever(BendingModel::Hinge, gamma, [48, 96, 192]);
+    }
+}
+
+/// A free strip with a curvature at rest lies on a circle of it, to 1 %, ends to the front where it is positive, whichever yarns it
+/// is cut along and however the mesh lies.
+#[test]
+fn a_strip_lies_at_rest_with_the_curvature_of_its_fabric() {
+    for (key, length, width, curvature) in [
+        ("curvature_weft", 0.06, 0.012, 20.0),
+        ("curvature_warp", 0.012, 0.06, 20.0),
+        ("curvature_warp", 0.012, 0.06, -20.0),
+    ] {
+        let text = format!(
+            r#"{{"toile_garment": 1, "name": "strip", "edge_length": 0.003,
+                "panels": [{{"name": "p", "fabric": "y",
+                    "vertices": [[0, 0], [{length}, 0], [{length}, {width}], [0, {width}]],
+                    "edges": [[0, 1], [1, 2], [2, 3], [3, 0]]}}],
+                "fabrics": [{{"name": "y", "bending": {{"weft": 2e-5, "warp": 2e-5, "{key}": {curvature}}}}}]}}"#
+        );
+        let garment = garment_from_json(&text, None).expect("garment");
+        let options = SimOptions {
+            gravity: Some([0.0; 3]),
+            ..SimOptions::default()
+        };
+        let mut sim = Sim::new(&garment, &options).expect("sim");
+        let drape = DrapeOptions {
+            force_tolerance: 1e-9,
+            max_steps: 0,
+        };
+        let report = sim.drape(&drape, &mut |_| true).expect("drape");
+        assert_eq!(report.outcome, Outcome::Converged, "{report:?}");
+        let x = sim.positions();
+        let mesh = sim.mesh();
+        let along = usize::from(width > length);
+        let half = 0.5 * f64::max(length, width);
+        // mean places at both ends and in the middle
+        let at = |place: f64| -> Vec3 {
+            let near: Vec<Vec3> = (mesh.uv.iter().zip(x))
+                .filter(|(uv, _)| (uv[along] - place).abs() < 0.6e-3)
+                .map(|(_, x)| *x)
+                .collect();
+            assert!(!near.is_empty(), "{place}");
+            near.iter().sum::<Vec3>() / near.len() as f64
+        };
+        let (a, b) = (at(0.0), at(2.0 * half));
+        let chord = (b - a).norm();
+        // the arc of that length and chord
+        let bow = |kappa: f64| 2.0 / kappa * (kappa * half).sin() - chord;
+        let (mut low, mut high) = (1e-3, 3.0 / half);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if bow(middle) > 0.0 {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        println!("{key} {curvature}: {low}");
+        assert!(
+            (low / f64::abs(curvature) - 1.0).abs() < 0.01,
+            "{key}: {low}"
+        );
+        let rise = (a + b) * 0.5 - x.iter().sum::<Vec3>() / x.len() as f64;
+        let front = mesh
+            .triangles
+            .iter()
+            .map(|t| {
+                let [p, q, r] = t.map(|v| x[v as usize]);
+                (q - p).cross(&(r - p))
+            })
+            .sum::<Vec3>();
+        assert!(rise.dot(&front) * curvature > 0.0, "{key} {curvature}");
     }
 }

@@ -3,11 +3,11 @@
 #![allow(clippy::expect_used, reason = "a test may stop here")]
 
 use crate::sheets::{NoBodies, PATTERNS, Random};
-use toile::math::{Mat2, Vec3};
-use toile::pattern::Fabric;
+use toile::math::{Mat2, Mat3, Vec3};
+use toile::pattern::{Fabric, Ridge};
 use toile::system::gravity::Gravity;
 use toile::system::membrane::Membrane;
-use toile::system::term::{Term, World};
+use toile::system::term::{Configuration, HessianKind, Term, World};
 
 fn world(gravity: Vec3) -> World<'static> {
     World {
@@ -74,6 +74,72 @@ fn uniform_strain_is_exact_on_every_mesh() {
             .fold(0.0, f64::max);
         println!("{pattern:?}: position off by {off:.1e} m, stress by {stress:.1e}");
         assert!(off < 1e-11 && stress < 1e-9);
+    }
+}
+
+/// Ridges of one stiffness are the Saint Venant-Kirchhoff membrane that they add up to, damping, softening and all: energies,
+/// forces and Hessians of a random state agree to 1e-12.
+#[test]
+fn parabolas_along_ridges_are_the_membrane_they_add_up_to() {
+    let plain = Fabric {
+        weft: 350.0,
+        warp: 250.0,
+        coupling: 50.0,
+        shear: 85.0,
+        damping_stiffness: 0.01,
+        ..Fabric::default()
+    };
+    let ridge = |d: [f64; 3], k: f64| Ridge::new(d.into(), vec![0.0], vec![k]).expect("a ridge");
+    let ridged = Fabric {
+        weft: 100.0,
+        warp: 100.0,
+        coupling: 0.0,
+        shear: 5.0,
+        ridges: vec![
+            ridge([1.0, 0.0, 0.0], 200.0),
+            ridge([0.0, 0.5, 0.0], 400.0),
+            ridge([1.0, 1.0, 0.0], 50.0),
+            ridge([0.0, 0.0, 2.0], 20.0),
+        ],
+        ..plain.clone()
+    };
+    assert_eq!(ridged.along(), plain.along());
+    let [a, b] = [plain, ridged].map(|f| {
+        let cloth = crate::sheets::sheet(PATTERNS[0], 0.2, 0.15, 6, f);
+        (Membrane::new(&cloth, 0.3), cloth)
+    });
+    let mut random = Random::new(11);
+    let mut state = || -> Vec<Vec3> {
+        let points = a.1.mesh.uv.iter();
+        points
+            .map(|p| Vec3::new(p.x, p.y, 0.0) + random.vec3(5e-3))
+            .collect()
+    };
+    let (x, x0) = (state(), state());
+    let still = world(Vec3::zeros());
+    let at = Configuration {
+        x: &x,
+        x0: &x0,
+        u: &[],
+        inv_dt: 50.0,
+        world: &still,
+    };
+    for t in 0..a.1.areas.len() {
+        let [[va, ga, ha], [vb, gb, hb]] = [&a.0, &b.0].map(|m| {
+            let (mut g, mut h) = ([Vec3::zeros(); 3], [Mat3::zeros(); 6]);
+            m.gradient(t, &at, &mut g);
+            m.hessian(t, &at, HessianKind::Psd, &mut h);
+            let g: Vec<f64> = g.iter().flat_map(|v| v.iter().copied()).collect();
+            let h: Vec<f64> = h.iter().flat_map(|m| m.iter().copied()).collect();
+            [vec![m.value(t, &at)], g, h]
+        });
+        for (a, b) in [(va, vb), (ga, gb), (ha, hb)] {
+            let size = a.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+            for (a, b) in a.iter().zip(&b) {
+                assert!((a - b).abs() < 1e-12 * size, "{t}: {a} {b}");
+            }
+        }
+        assert!((a.0.stress(t, &x) - b.0.stress(t, &x)).norm() < 1e-12 * a.0.stress(t, &x).norm());
     }
 }
 

@@ -55,6 +55,8 @@ mod docs;
 mod drape_ends;
 #[path = "fabric_cell.rs"]
 mod fabric_cell;
+#[path = "fabric_fitted.rs"]
+mod fabric_fitted;
 #[path = "fmi.rs"]
 mod fmi;
 #[path = "hard_cases.rs"]

@@ -87,12 +87,12 @@ impl Cloth {
         self.areas.iter().sum()
     }
 
-    /// Membrane stiffness along warp and weft, mean over the area [N/m].
+    /// Membrane stiffness along warp and weft without strain, mean over the area [N/m].
     pub fn mean_stiffness(&self) -> f64 {
         let sum: f64 = (self.areas.iter().enumerate())
             .map(|(t, area)| {
-                let fabric = self.fabric_of(t);
-                0.5 * area * (fabric.warp + fabric.weft)
+                let [weft, warp] = self.fabric_of(t).along();
+                0.5 * area * (warp + weft)
             })
             .sum();
         sum / self.area()

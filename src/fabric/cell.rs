@@ -8,8 +8,8 @@
 //!
 //! Images are riders ([`crate::blend::Riders`]) on their own node and on two further points, which stand for `A_1` and
 //! `A_2` as vertices without triangles, held where `F` has them. Every energy is the
-//! system's own, with its part in the cell ([`crate::yarn::periodic`]); gravity is off, and so is the contact of spheres,
-//! as yarns of a flat cell are kept apart by their contacts.
+//! system's own, with its part in the cell ([`crate::yarn::periodic`]); gravity is off. Layers of a fabric that folds touch
+//! each other and their images without friction, as far as there are images.
 //!
 //! A bent cell lies on a cylinder of radius `1/kappa` about an axis `c` along one of the lattice vectors, `A`:
 //!
@@ -20,10 +20,12 @@
 //! Its middle is free to move towards the axis and away from it, so that it is as long as it likes. `W` is per area of the
 //! flat layout. SI units.
 
-use crate::blend::{Coupling, Rider, Riders};
+use super::bend::{Bend, lattice, rider};
+use crate::blend::{Coupling, Riders};
 use crate::cloth::Cloth;
 use crate::error::{Error, Result};
 use crate::math::{Mat3, Vec2, Vec3};
+use crate::pattern::chart::{Face, Stitch};
 use crate::pattern::yarn_fabric::{Knit, Structure, YarnFabric};
 use crate::pattern::{Fabric, Garment};
 use crate::solve::engine::Engine;
@@ -37,28 +39,22 @@ use crate::tri::grid::rectangle;
 use crate::yarn::layout::{Layout, lay};
 use crate::yarn::periodic::NodeImage;
 use crate::yarn::{YarnMaterial, Yarns};
-use nalgebra::{Matrix3x2, Rotation3, Unit};
+use nalgebra::Matrix3x2;
+use std::f64::consts::PI;
 use std::sync::Arc;
 
 /// Pitches of fabric laid around the cell.
 const MARGIN: f64 = 6.0;
+/// Pitches, and repeats, around the cell within which there are images to touch.
+const AROUND: [f64; 2] = [4.0, 2.0];
+/// Pitches to which a fold is looked for.
+const FARTHEST: f64 = 12.0;
 /// Corrections of one relaxation.
 const STEPS: u64 = 4000;
-/// Part of two radii below which yarns count as touching.
-const NEARER: f64 = 0.999;
+/// Force that counts as none, over that of a yarn bent to a radius of the pitch.
+const NOTHING: f64 = 1e-5;
 /// First and largest step of a relaxation [s].
 const STEPS_IN_TIME: [f64; 2] = [0.01, 10.0];
-
-/// How a cell is bent.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Bend {
-    /// Direction of the layout that is curved.
-    axis: usize,
-    /// Curvature [1/m].
-    curvature: f64,
-    /// Deformation gradient before.
-    plane: Matrix3x2<f64>,
-}
 
 /// One repeat, or a few, of a fabric.
 pub struct PeriodicCell {
@@ -68,8 +64,10 @@ pub struct PeriodicCell {
     yarns: Arc<Yarns>,
     images: Vec<NodeImage>,
     size: Vec2,
-    /// Larger pitch [m].
-    apart: f64,
+    /// Distances of neighbouring yarns or loops [m].
+    pitch: Vec2,
+    /// `B pi R^2 / d^2` of the larger pitch `d` [N].
+    scale: f64,
     bend: Option<Bend>,
 }
 
@@ -86,32 +84,44 @@ impl PeriodicCell {
         let counts = fabric.structure.repeat();
         let counts = [0, 1].map(|k| counts[k] as f64 * repeats[k] as f64);
         let size = pitch.component_mul(&Vec2::from(counts));
-        let margin = pitch * (2.0 * MARGIN);
-        let garment = swatch(fabric, size + margin);
+        // the cell lies up to half its size off the middle
+        let garment = swatch(fabric, size * 2.0 + pitch * (2.0 * MARGIN));
         let layout = Layout {
             max_nodes: settings.max_yarn_nodes as usize,
             ..Layout::default()
         };
-        let cell = lay(&garment, &layout)?.periodic(size)?;
+        let around = (pitch * AROUND[0]).inf(&(size * AROUND[1]));
+        let cell = lay(&garment, &layout)?.periodic(size, around)?;
         let yarns = Arc::new(Yarns::laid(cell.mesh, vec![YarnMaterial::from(fabric)]));
-        let settings = Settings {
-            self_contact: 0.0,
-            ..settings.clone()
-        };
-        let engine = engine(&yarns, &cell.images, size, None, &settings)?;
+        let engine = engine(&yarns, &cell.images, size, None, settings)?;
         let state = laid_state(&yarns, lattice(size, None));
         let mut cell = Self {
             engine,
             state,
-            settings,
+            settings: settings.clone(),
             yarns,
             images: cell.images,
             size,
-            apart: pitch.max(),
+            pitch,
+            scale: fabric.bending * PI * (fabric.radius / pitch.max()).powi(2),
             bend: None,
         };
         cell.settle();
         Ok(cell)
+    }
+
+    /// A cell of one repeat; of a knit that folds, since a course has loops of both faces, one of an even number of courses.
+    /// They run to and fro, and a course that slides as all others do finds no rest in its folds.
+    pub fn one(fabric: &YarnFabric, settings: &Settings) -> Result<Self> {
+        let has = |row: &[Stitch], face| row.contains(&Stitch::Plain(face));
+        let folds = match &fabric.structure {
+            Structure::Woven(_) => false,
+            Structure::Knitted(knit) => {
+                (knit.chart.rows().iter()).any(|row| has(row, Face::Knit) && has(row, Face::Purl))
+            }
+        };
+        let odd = !fabric.structure.repeat()[1].is_multiple_of(2);
+        Self::new(fabric, [1, 1 + usize::from(folds && odd)], settings)
     }
 
     /// Size of the flat layout, across and along [m].
@@ -135,16 +145,43 @@ impl PeriodicCell {
         &self.yarns
     }
 
-    /// Distances as laid and now of two nodes that were laid a pitch apart or more and are now nearer than yarns are thick
-    /// (by more than a thousandth) [m].
-    pub(super) fn touching(&self) -> Option<[f64; 2]> {
+    /// Whether two nodes that were laid a pitch apart or more lie on each other, nearer than yarns are thick.
+    pub(super) fn folds(&self) -> bool {
         let mesh = &self.yarns.mesh;
-        let radius = self.yarns.materials.first().map_or(0.0, |m| m.radius);
+        let thick = 2.0 * self.yarns.materials.first().map_or(0.0, |m| m.radius);
         let x = self.nodes();
         let own = (0..x.len()).filter(|n| mesh.is_inside(*n as u32));
         own.flat_map(|a| (0..x.len()).map(move |b| (a, b)))
-            .map(|(a, b)| [(mesh.uv[a] - mesh.uv[b]).norm(), (x[a] - x[b]).norm()])
-            .find(|[laid, now]| *laid >= self.apart && *now < 2.0 * NEARER * radius)
+            .any(|(a, b)| {
+                (mesh.uv[a] - mesh.uv[b]).norm() >= self.pitch.max() && (x[a] - x[b]).norm() < thick
+            })
+    }
+
+    /// Repeats across and along, as far as yarns reach, after which a node is nearer to another than yarns are thick though
+    /// there is no image of it to touch.
+    pub(super) fn missing(&self) -> Option<[i32; 2]> {
+        let mesh = &self.yarns.mesh;
+        let thick = 2.0 * self.yarns.materials.first().map_or(0.0, |m| m.radius);
+        let (f, x) = (self.gradient(), self.nodes());
+        let own: Vec<u32> = (0..x.len() as u32).filter(|n| mesh.is_inside(*n)).collect();
+        let [across, along] =
+            [0, 1].map(|k| (FARTHEST * self.pitch[k] / self.size[k]).ceil() as i32);
+        for steps in (-across..=across).flat_map(|m| (-along..=along).map(move |n| [m, n])) {
+            if steps == [0, 0] {
+                continue;
+            }
+            let by = f * self
+                .size
+                .component_mul(&Vec2::new(steps[0].into(), steps[1].into()));
+            for b in &own {
+                let there = self.images.iter().any(|i| i.of == *b && i.steps == steps);
+                let place = x[*b as usize] + by;
+                if !there && own.iter().any(|a| (x[*a as usize] - place).norm() < thick) {
+                    return Some(steps);
+                }
+            }
+        }
+        None
     }
 
     /// Positions of the yarns' nodes [m].
@@ -198,7 +235,8 @@ impl PeriodicCell {
             yarns: self.yarns.clone(),
             images: self.images.clone(),
             size: self.size,
-            apart: self.apart,
+            pitch: self.pitch,
+            scale: self.scale,
             bend: Some(bend),
         };
         cell.settle();
@@ -236,13 +274,18 @@ impl PeriodicCell {
     }
 
     /// What it is in, to go back to.
-    pub(super) fn checkpoint(&self) -> State {
+    pub fn checkpoint(&self) -> State {
         self.state.clone()
     }
 
     /// Goes back to a state that it was in.
-    pub(super) fn roll_back(&mut self, state: State) {
+    pub fn roll_back(&mut self, state: State) {
         self.state = state;
+    }
+
+    /// A force that counts as none beside those of the yarns [N].
+    pub fn nothing(&self) -> f64 {
+        NOTHING * self.scale
     }
 
     /// Brings everything inside to rest, to a largest force on a node or a lattice vector [N]; the corrections taken.
@@ -287,76 +330,6 @@ fn frame(f: &Matrix3x2<f64>) -> Mat3 {
     Mat3::from_columns(&[a, b, a.cross(&b).normalize()])
 }
 
-/// Repeats around a cylinder that images are away.
-const TURNS: [i32; 4] = [-2, -1, 1, 2];
-
-impl Bend {
-    /// A plane point on the cylinder.
-    fn apply(&self, x: &Vec3) -> Vec3 {
-        let radius = 1.0 / self.curvature;
-        let (sine, cosine) = (self.curvature * x[self.axis]).sin_cos();
-        let out = radius - x.z;
-        let mut y = *x;
-        y[self.axis] = out * sine;
-        y.z = radius - out * cosine;
-        y
-    }
-
-    /// Turn about the axis over `n` repeats of a cell of this size.
-    fn turn(&self, size: Vec2, n: i32) -> Mat3 {
-        let length = size[self.axis] * self.plane.column(self.axis).norm();
-        // the far end rises to the front
-        let about = if self.axis == 0 {
-            -Vec3::y()
-        } else {
-            Vec3::x()
-        };
-        let angle = f64::from(n) * self.curvature * length;
-        Rotation3::from_axis_angle(&Unit::new_unchecked(about), angle).into_inner()
-    }
-}
-
-/// Points of the lattice: its vectors, or of a bent cell the one along the axis and what the turns leave.
-fn lattice(size: Vec2, bend: Option<&Bend>) -> Vec<Vec3> {
-    let Some(bend) = bend else {
-        return vec![Vec3::x() * size.x, Vec3::y() * size.y];
-    };
-    let along = 1 - bend.axis;
-    let centre = Vec3::z() / bend.curvature;
-    let left = |n: &i32| (bend.turn(size, *n).transpose() - Mat3::identity()) * centre;
-    let mut out: Vec<Vec3> = vec![bend.plane.column(along) * size[along]];
-    out.extend(TURNS.iter().map(left));
-    out
-}
-
-/// What carries an image; `first` points are the lattice's.
-fn rider(image: &NodeImage, first: u32, size: Vec2, bend: Option<&Bend>) -> Result<Rider> {
-    let (point, of) = (first + image.node, first + image.of);
-    let [m, n] = image.steps.map(f64::from);
-    let Some(bend) = bend else {
-        return Ok(Rider {
-            point,
-            vertices: [of, 0, 1],
-            weights: [1.0, m, n],
-            turn: Mat3::identity(),
-        });
-    };
-    let around = image.steps[bend.axis];
-    let place = TURNS.iter().position(|t| *t == around);
-    if place.is_none() && around != 0 {
-        return Err(Error::material(format!(
-            "a bent cell has images {around} repeats away, at most 2 can be: take more repeats"
-        )));
-    }
-    let part = f64::from(u8::from(place.is_some()));
-    Ok(Rider {
-        point,
-        vertices: [of, 0, 1 + place.unwrap_or(0) as u32],
-        weights: [1.0, f64::from(image.steps[1 - bend.axis]), part],
-        turn: bend.turn(size, around),
-    })
-}
-
 fn engine(
     yarns: &Arc<Yarns>,
     images: &[NodeImage],
@@ -386,7 +359,11 @@ fn engine(
             panel_starts: vec![0, count as u32],
             ..GarmentMesh::default()
         },
-        fabrics: vec![Fabric::default()],
+        // layers that rubbed would have an energy of their path
+        fabrics: vec![Fabric {
+            friction: 0.0,
+            ..Fabric::default()
+        }],
         panel_fabric: vec![0],
         panel_grain: vec![0.0],
         // they move unless they are held

@@ -1,7 +1,7 @@
 //! The triangles' material of a fabric, fitted to its yarns by tests on the periodic cell.
 //!
-//! The cell is brought to rest ([`rest`](super::rest)); from there it is stretched across, along, both ways, sheared, and both
-//! at once, in steps, with the contacts held where they slid to, so that there is one energy of the strain. With the Green
+//! The cell is brought to rest ([`rest`](super::rest)); from there it is stretched across, along and both ways, pressed together one way, also while
+//! it is stretched the other, sheared, and both at once, in steps, with the contacts held where they slid to, so that there is one energy of the strain. With the Green
 //! strain `E` against the size at rest and `W` per area at rest, less that at rest,
 //!
 //! ```text
@@ -9,29 +9,34 @@
 //! W ~ M kappa + 1/2 B kappa^2 = 1/2 B (kappa - kappa0)^2 - const,   kappa0 = -M/B
 //! ```
 //!
-//! by least squares of the errors over `W`, so that small strains count like large ones. In bending tests the width across is
+//! by least squares of the errors over `W`, so that small strains count like large ones. A fabric that this does not follow has
+//! ridges as well ([`ridges`](super::ridges)). The stress at rest is left out, of `W` too: a knit held square has one of shear. In bending tests the width across is
 //! that at rest and the length is free. What the fit leaves is told as an error of energy. SI units.
 
 use super::cell::PeriodicCell;
 use super::rest::{Rest, rest, sized};
+use super::ridges::{Ridged, ridged};
 use crate::error::{Error, Result};
 use crate::pattern::Fabric;
 use crate::pattern::yarn_fabric::{Structure, YarnFabric};
 use crate::solve::settings::Settings;
 use nalgebra::{Matrix2, Matrix3x2, Matrix4, Vector2, Vector3, Vector4};
 
-/// Force to which nodes come to rest in the tests [N].
-const FORCE: f64 = 1e-9;
 /// Least weight of an energy, over the largest.
 const LEAST: f64 = 1e-6;
+/// Error of energy, root mean square, above which a fabric gets ridges.
+const FOLLOWS: f64 = 0.02;
 /// Least stiffness of a fit over its largest: a material must be positive definite.
-const FLOOR: f64 = 1e-4;
+pub(super) const FLOOR: f64 = 1e-4;
 
 /// Largest strains and curvatures of the tests, and how many steps lead there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
     /// Green strain `E11`, `E22`.
     pub stretch: f64,
+    /// Strain, without its sign, of a direction that is pressed together, alone or while the other is stretched; 0 for no such
+    /// tests.
+    pub press: f64,
     /// Shear strain `2 E12`.
     pub shear: f64,
     /// Curvature [1/m].
@@ -41,32 +46,58 @@ pub struct Range {
 }
 
 impl Range {
-    /// What suits a fabric: yarns of a weave are stretched at once, loops of a knit give way first.
+    /// What suits a fabric: yarns of a weave are stretched at once, loops of a knit give way first, by drawing in across.
+    /// A weave that is pressed together buckles as a sheet long before its yarns do between their crossings.
     pub fn of(fabric: &YarnFabric) -> Self {
         let [a, b] = fabric.structure.pitch();
-        let stretch = match fabric.structure {
-            Structure::Woven(_) => 0.01,
-            Structure::Knitted(_) => 0.1,
+        let (stretch, press, steps) = match fabric.structure {
+            Structure::Woven(_) => (0.01, 0.0, 4),
+            Structure::Knitted(_) => (0.1, 0.1, 20),
         };
         Self {
             stretch,
+            press,
             shear: 0.1,
             curvature: 0.15 / a.max(b),
-            steps: 4,
+            steps,
         }
+    }
+
+    /// Where a test ends.
+    pub fn end(&self, direction: &[f64; 3]) -> Vector3<f64> {
+        let plane = |d: f64| d * if d < 0.0 { self.press } else { self.stretch };
+        let [weft, warp, shear] = *direction;
+        Vector3::new(plane(weft), plane(warp), shear * self.shear)
     }
 }
 
-/// A test: strains grow along a direction.
-pub const TESTS: [(&str, [f64; 3]); 8] = [
+/// A test: strains grow along a direction, over the largest of their range.
+pub const TESTS: [(&str, [f64; 3]); 25] = [
     ("weft", [1.0, 0.0, 0.0]),
     ("warp", [0.0, 1.0, 0.0]),
     ("both", [1.0, 1.0, 0.0]),
     ("weft, half warp", [1.0, 0.5, 0.0]),
+    ("warp, half weft", [0.5, 1.0, 0.0]),
+    ("weft pressed", [-1.0, 0.0, 0.0]),
+    ("warp pressed", [0.0, -1.0, 0.0]),
+    ("weft, less warp", [1.0, -1.0, 0.0]),
+    ("warp, less weft", [-1.0, 1.0, 0.0]),
+    ("weft, half less warp", [1.0, -0.5, 0.0]),
+    ("warp, half less weft", [-0.5, 1.0, 0.0]),
+    ("weft, quarter less warp", [1.0, -0.25, 0.0]),
+    ("warp, quarter less weft", [-0.25, 1.0, 0.0]),
     ("shear", [0.0, 0.0, 1.0]),
     ("shear back", [0.0, 0.0, -1.0]),
     ("weft and shear", [1.0, 0.0, 1.0]),
     ("warp and shear", [0.0, 1.0, 1.0]),
+    ("weft and shear back", [1.0, 0.0, -1.0]),
+    ("warp and shear back", [0.0, 1.0, -1.0]),
+    ("both and shear", [1.0, 1.0, 1.0]),
+    ("both and shear back", [1.0, 1.0, -1.0]),
+    ("weft, less warp, shear", [1.0, -1.0, 1.0]),
+    ("weft, less warp, shear back", [1.0, -1.0, -1.0]),
+    ("warp, less weft, shear", [-1.0, 1.0, 1.0]),
+    ("warp, less weft, shear back", [-1.0, 1.0, -1.0]),
 ];
 
 /// The cell at one strain.
@@ -76,7 +107,7 @@ pub struct Sample {
     pub test: usize,
     /// `(E11, E22, 2 E12)`.
     pub strain: Vector3<f64>,
-    /// `W` [J/m^2].
+    /// `W`, less the work of the stress at rest [J/m^2].
     pub energy: f64,
     /// Second Piola-Kirchhoff stress `(S11, S22, S12)`, less that at rest [N/m].
     pub stress: Vector3<f64>,
@@ -122,10 +153,12 @@ pub struct Fit {
     pub samples: Vec<Sample>,
     /// Tests of bending.
     pub bent: Vec<BentSample>,
-    /// `(weft, coupling, warp, shear)` [N/m].
+    /// `(weft, coupling, warp, shear)` without ridges [N/m].
     pub membrane: [f64; 4],
-    /// Root mean square and largest error of the membrane's energy, each over the yarns'.
+    /// Root mean square and largest error of its energy, each over the yarns'.
     pub errors: [f64; 2],
+    /// The membrane with ridges, where the one without does not follow the yarns.
+    pub ridged: Option<Ridged>,
     /// Bending that curves the weft, the warp.
     pub bending: [Bending; 2],
     /// Corrections of everything inside that all tests took.
@@ -147,6 +180,8 @@ pub fn fit(fabric: &YarnFabric, range: &Range, settings: &Settings) -> Result<Fi
     for (name, value, least, most) in [
         ("stretch", range.stretch, 1e-4, 1.0),
         ("shear", range.shear, 1e-4, 1.0),
+        // the area vanishes at 0.5
+        ("press", range.press, 0.0, 0.45),
         ("curvature", range.curvature, 1e-2, 1e5),
     ] {
         if !(least..=most).contains(&value) {
@@ -161,30 +196,30 @@ pub fn fit(fabric: &YarnFabric, range: &Range, settings: &Settings) -> Result<Fi
             range.steps
         )));
     }
-    let mut cell = PeriodicCell::new(fabric, [1, 1], settings)?;
+    let mut cell = PeriodicCell::one(fabric, settings)?;
     let at_rest = rest(&mut cell)?;
-    let mut corrections = at_rest.corrections + cell.relax(FORCE)?;
+    let mut corrections = at_rest.corrections + cell.relax(cell.nothing())?;
     let area: f64 = at_rest.factors.iter().product();
     let start = (cell.energy()?, second(&mut cell, at_rest.factors)?);
     let kept = cell.checkpoint();
     let mut samples = Vec::with_capacity(TESTS.len() * range.steps);
     for (test, (name, direction)) in TESTS.iter().enumerate() {
+        let end = range.end(direction);
+        if range.press == 0.0 && direction.iter().take(2).any(|d| *d < 0.0) {
+            continue;
+        }
         cell.roll_back(kept.clone());
         for step in 1..=range.steps {
             let part = step as f64 / range.steps as f64;
-            let strain = Vector3::new(
-                direction[0] * range.stretch,
-                direction[1] * range.stretch,
-                direction[2] * range.shear,
-            ) * part;
+            let strain = end * part;
             cell.stretch(&strained(at_rest.factors, &strain));
             corrections += cell
-                .relax(FORCE)
+                .relax(cell.nothing())
                 .map_err(|e| e.at(format!("{name}, strain {:?}", strain.as_slice())))?;
             samples.push(Sample {
                 test,
                 strain,
-                energy: (cell.energy()? - start.0) / area,
+                energy: (cell.energy()? - start.0) / area - start.1.dot(&strain),
                 stress: second(&mut cell, at_rest.factors)? - start.1,
             });
         }
@@ -197,7 +232,7 @@ pub fn fit(fabric: &YarnFabric, range: &Range, settings: &Settings) -> Result<Fi
                 let curvature = side * range.curvature * step as f64 / range.steps as f64;
                 let mut test = cell.bent(axis, curvature)?;
                 corrections += test
-                    .relax(FORCE)
+                    .relax(test.nothing())
                     .map_err(|e| e.at(format!("curvature {curvature} 1/m")))?;
                 bent.push(BentSample {
                     axis,
@@ -209,7 +244,11 @@ pub fn fit(fabric: &YarnFabric, range: &Range, settings: &Settings) -> Result<Fi
     }
     let membrane = membrane(&samples)?;
     let errors = errors(&samples, |e| energy(&membrane, e));
+    let ridged = (errors[0] > FOLLOWS)
+        .then(|| ridged(&samples, &membrane, range))
+        .transpose()?;
     Ok(Fit {
+        ridged,
         rest: at_rest,
         density: cell.density() / area,
         membrane,
@@ -249,7 +288,7 @@ fn second(cell: &mut PeriodicCell, factors: [f64; 2]) -> Result<Vector3<f64>> {
 }
 
 /// Weights of least squares: one over each energy.
-fn weights(energies: impl Iterator<Item = f64> + Clone) -> Vec<f64> {
+pub(super) fn weights(energies: impl Iterator<Item = f64> + Clone) -> Vec<f64> {
     let largest = energies.clone().map(f64::abs).fold(0.0, f64::max);
     energies
         .map(|w| 1.0 / w.abs().max(LEAST * largest))
@@ -329,17 +368,29 @@ fn bending(samples: &[BentSample], axis: usize) -> Result<Bending> {
 }
 
 impl Fit {
+    /// `W` of the triangles' membrane [J/m^2].
+    pub fn energy(&self, strain: &Vector3<f64>) -> f64 {
+        let without = || energy(&self.membrane, strain);
+        self.ridged
+            .as_ref()
+            .map_or_else(without, |r| r.energy(strain))
+    }
+
     /// A fabric with this material, everything else as it was.
     pub fn fabric(&self, like: &Fabric) -> Fabric {
-        let [weft, coupling, warp, shear] = self.membrane;
+        let ridged = self.ridged.as_ref();
+        let [weft, coupling, warp, shear] = ridged.map_or(self.membrane, |r| r.membrane);
         Fabric {
             density: self.density,
             weft,
             coupling,
             warp,
             shear,
+            ridges: ridged.map_or_else(Vec::new, |r| r.ridges.clone()),
             bending_weft: self.bending[0].rigidity,
             bending_warp: self.bending[1].rigidity,
+            curvature_weft: self.bending[0].rest(),
+            curvature_warp: self.bending[1].rest(),
             ..like.clone()
         }
     }

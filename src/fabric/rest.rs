@@ -12,6 +12,7 @@
 //! the size changes; in between Newton's method moves the size with the contacts held, where `W` is smooth. SI units.
 
 use super::cell::PeriodicCell;
+use super::known::Known;
 use crate::error::{Error, Result};
 use crate::math::{Mat2, Vec2};
 use crate::pattern::Garment;
@@ -19,10 +20,7 @@ use crate::pattern::yarn_fabric::YarnFabric;
 use crate::solve::settings::Settings;
 use crate::yarn::Cell;
 use nalgebra::{Matrix3x2, SymmetricEigen};
-use std::sync::{Mutex, PoisonError};
 
-/// Force to which nodes come to rest, over the stress times the cell's width.
-const FORCE: f64 = 1e-9;
 /// Largest change of a factor in one correction.
 const MOST: f64 = 0.05;
 /// Change of the factors below which they are those of rest.
@@ -45,14 +43,8 @@ pub struct Rest {
     pub corrections: u64,
 }
 
-/// Most fabrics whose sizes are remembered.
-const REMEMBERED: usize = 64;
-
-/// What a size at rest is a function of.
-type Key = (YarnFabric, Vec<(String, f64)>);
-
 /// Sizes found while the program runs.
-static KNOWN: Mutex<Vec<(Key, Cell)>> = Mutex::new(Vec::new());
+static KNOWN: Known<Cell> = Known::new();
 
 /// How the fabrics of a garment are laid: compensated ones at their size at rest, if the garment is laid as yarns there
 /// (`laid`, by fabric).
@@ -70,24 +62,20 @@ pub fn cells(
 }
 
 fn compensated(yarns: &YarnFabric, settings: &Settings) -> Result<Cell> {
-    let known = || KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
-    let key = (yarns.clone(), settings.that_matter());
-    if let Some((_, cell)) = known().iter().find(|(other, _)| *other == key) {
-        return Ok(*cell);
-    }
-    let found = rest(&mut PeriodicCell::new(yarns, [1, 1], settings)?)?;
-    let [across, along] = found.factors;
-    let cell = Cell {
-        across,
-        along,
-        rest: 1.0,
-    };
-    let mut known = known();
-    if known.len() == REMEMBERED {
-        known.remove(0);
-    }
-    known.push((key, cell));
-    Ok(cell)
+    KNOWN.of(yarns, settings, || {
+        let mut cell = PeriodicCell::one(yarns, settings)?;
+        let [across, along] = rest(&mut cell)?.factors;
+        if cell.folds() {
+            return Err(Error::material(format!(
+                "yarns.compensated: at rest ({across:.3} of its width, {along:.3} of its height) the fabric folds onto itself, and yarns are laid flat"
+            )));
+        }
+        Ok(Cell {
+            across,
+            along,
+            rest: 1.0,
+        })
+    })
 }
 
 /// `diag(factors)` as a gradient to space.
@@ -100,7 +88,7 @@ pub fn sized(factors: [f64; 2]) -> Matrix3x2<f64> {
 /// Brings a cell to its size at rest and leaves it there, its contacts held where they slid to.
 pub fn rest(cell: &mut PeriodicCell) -> Result<Rest> {
     let mut factors = Vec2::new(1.0, 1.0);
-    let mut corrections = cell.relax(FORCE)?;
+    let mut corrections = cell.relax(cell.nothing())?;
     let laid = cell.energy()?;
     for _ in 0..ROUNDS {
         let stress = tension(cell)?;
@@ -115,11 +103,11 @@ pub fn rest(cell: &mut PeriodicCell) -> Result<Rest> {
         let step = step * (MOST / step.amax()).min(1.0);
         factors += step;
         cell.stretch(&sized(factors.into()));
-        corrections += cell.relax(FORCE)?;
+        corrections += cell.relax(cell.nothing())?;
         if step.amax() < STEADY {
-            if let Some([laid, now]) = cell.touching() {
+            if let Some(steps) = cell.missing() {
                 return Err(Error::material(format!(
-                    "at rest ({:.3} of its width, {:.3} of its height) the fabric folds onto itself: yarns {laid:.2e} m apart as laid are {now:.2e} m apart, and layers of a periodic cell do not touch",
+                    "at rest ({:.3} of its width, {:.3} of its height) the fabric folds onto its image {steps:?} repeats away, which is too far to touch in a periodic cell",
                     factors.x, factors.y
                 )));
             }
@@ -154,7 +142,7 @@ fn stiffness(cell: &mut PeriodicCell, at: Vec2, corrections: &mut u64) -> Result
             let mut moved = at;
             moved[k] += side * DIFFERENCE;
             cell.stretch(&sized(moved.into()));
-            *corrections += cell.relax(FORCE)?;
+            *corrections += cell.relax(cell.nothing())?;
             *column += tension(cell)? * (side / (2.0 * DIFFERENCE));
         }
     }

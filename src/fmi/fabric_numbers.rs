@@ -47,6 +47,16 @@ macro_rules! numbers {
     };
 }
 
+impl FabricNumber {
+    /// Whether a fit to yarns decides it.
+    pub fn is_fitted(self) -> bool {
+        !matches!(
+            self,
+            Self::DampingMass | Self::DampingStiffness | Self::Thickness | Self::Friction
+        )
+    }
+}
+
 numbers! {
     Density "density" density "kg/m^2" Some(1e-6), "mass per area";
     Warp "membrane.warp" warp "N/m" Some(1e-9), "stiffness along the warp";

@@ -13,9 +13,11 @@ pub mod fabric;
 pub mod import;
 pub mod measure;
 pub mod outline;
+pub mod ridge;
 pub mod yarn_fabric;
 
 pub use fabric::{BendingModel, Fabric};
+pub use ridge::Ridge;
 pub use yarn_fabric::YarnFabric;
 
 use crate::math::{Rotation, Vec2, Vec3};

@@ -66,6 +66,8 @@ pub(super) struct FanRest {
     pub(super) measure: Measure,
     /// Rigidity of the components `(weft, twist, warp)` of a moment [N m].
     pub(super) rigidity: Vec3,
+    /// Curvature at rest, its components as those of the bend [1/m].
+    curvature: Vec3,
     /// `W` [N/m]: energy by the bend squared.
     pub(super) stiffness: Mat3,
     pub(super) damping: f64,
@@ -87,6 +89,8 @@ pub(super) enum FanKind {
 pub(super) struct Measure {
     /// `c_e` of each hinge [m].
     pub(super) weights: Vec<Vec3>,
+    /// Angle of each hinge by the components `(11, sqrt2 12, 22)` of a uniform curvature [m].
+    angles: Vec<Vec3>,
     /// Coefficients `b_j` of the bend of a surface `z`: `r = sum_j b_j z_j`.
     pub(super) operator: Vec<Vec3>,
     /// One over the root of the area, for each component [1/m].
@@ -109,6 +113,11 @@ pub(super) fn rigidity(f: &Fabric) -> Vec3 {
         0.5 * (f.bending_weft + f.bending_warp),
         f.bending_warp,
     )
+}
+
+/// Curvature at rest.
+fn curvature(f: &Fabric) -> Vec3 {
+    Vec3::new(f.curvature_weft, 0.0, f.curvature_warp)
 }
 
 /// Local vertices `[centre, neighbour, next, previous]` of hinge `k` of a fan with `ring`
@@ -157,6 +166,17 @@ impl FanRest {
     #[inline]
     pub(super) fn local_hinge(&self, k: usize) -> [usize; 4] {
         local_hinge(k, self.uv.len() - 1, self.kind)
+    }
+
+    /// Angle at rest of hinge `k` [rad].
+    #[inline]
+    pub(super) fn rest_angle(&self, k: usize) -> f64 {
+        self.measure.angles[k].dot(&self.curvature)
+    }
+
+    /// Its rate at these rates of the measure and of the fabric.
+    pub(super) fn rest_angle_rate(&self, k: usize, rates: &Measure, fabric: &Fabric) -> f64 {
+        rates.angles[k].dot(&self.curvature) + self.measure.angles[k].dot(&curvature(fabric))
     }
 
     /// Rates of the measure and of `W` along a change of the vertices' flat positions (panel
@@ -269,12 +289,14 @@ fn measure_with_rate(uv: &[Vec2], duv: &[Vec2], kind: FanKind) -> (Measure, Meas
     };
     let mut m = Measure {
         weights: Vec::with_capacity(hinges),
+        angles: Vec::with_capacity(hinges),
         operator: vec![Vec3::zeros(); ring + 1],
         root: Mat3::zeros(),
         normal: Vec3::zeros(),
     };
     let mut dm = Measure {
         weights: Vec::with_capacity(hinges),
+        angles: Vec::with_capacity(hinges),
         operator: vec![Vec3::zeros(); ring + 1],
         root: Mat3::zeros(),
         normal: Vec3::zeros(),
@@ -301,6 +323,8 @@ fn measure_with_rate(uv: &[Vec2], duv: &[Vec2], kind: FanKind) -> (Measure, Meas
         ds += dc * q.transpose() + c * dq.transpose();
         m.weights.push(c);
         dm.weights.push(dc);
+        m.angles.push(q);
+        dm.angles.push(dq);
     }
     let [(dual, ddual), (third, dthird)] = areas(uv, duv, kind);
     let (floor, dfloor) = (SMALLEST_AREA * third, SMALLEST_AREA * dthird);
@@ -375,6 +399,7 @@ pub(super) fn fan_groups(cloth: &Cloth, model: BendingModel) -> Vec<FanGroup> {
             stiffness: stiffness(&measure, &rigidity, kind),
             measure,
             rigidity,
+            curvature: curvature(fabric),
             damping: fabric.damping_stiffness,
             floor: HingeFloor {
                 length: 1e-4 * smallest.sqrt(),

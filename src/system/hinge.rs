@@ -7,7 +7,8 @@
 //! r = sum_e c_e (theta_e - theta0_e),   V = 1/2 r . W r,   c_e = l_e/2 (n1^2, sqrt2 n1 n2, n2^2)
 //! ```
 //!
-//! `Psd` is the Gauss-Newton part `J^T W J`, `J = sum_e c_e dtheta_e/dx`; `Exact` adds
+//! The angles `theta0_e = q_e . kappa0` are those of a surface with the fabric's curvature at rest; they may be beyond a half turn,
+//! and are then a moment that the cloth cannot follow. `Psd` is the Gauss-Newton part `J^T W J`, `J = sum_e c_e dtheta_e/dx`; `Exact` adds
 //! `sum_e (c_e . W r) d^2 theta_e / dx^2`. Damping replaces `r` by the change of `r` since the
 //! start of the step, times `beta/dt`; rigid motion is not damped. SI units. Limits: an angle jumps
 //! by a full turn where two triangles fold through each other; below 1e-4 of its rest size a
@@ -16,16 +17,13 @@
 use super::bending_fan::{FanGroup, FanRest, MAX_HINGES, fan_groups};
 use super::term::{Configuration, HessianKind, MAX_ARITY, RestChange, Stencils, Term};
 use crate::cloth::Cloth;
-use crate::error::{Error, Result};
-use crate::math::geometry::{dihedral, dihedral_gradient, dihedral_hessian, hinges, wrap_angle};
+use crate::math::geometry::{dihedral, dihedral_gradient, dihedral_hessian, wrap_angle};
 use crate::math::{Mat3, Vec3};
 use crate::pattern::BendingModel;
 
 /// Bending of all vertices with the same number of neighbours.
 pub struct Hinge {
     group: FanGroup,
-    /// Rest angles of the hinges of each fan [rad]; empty when flat.
-    rest_angles: Vec<[f64; MAX_HINGES]>,
 }
 
 #[inline]
@@ -36,55 +34,12 @@ fn gather(fan: &FanRest, k: usize, vertices: &[u32], x: &[Vec3]) -> ([usize; 4],
 }
 
 impl Hinge {
-    /// Bending of all panels with a fabric of [`BendingModel::Hinge`], flat at rest: one term for
-    /// each number of neighbours that occurs.
+    /// Bending of all panels with a fabric of [`BendingModel::Hinge`]: one term for each number of neighbours that occurs.
     pub fn terms(cloth: &Cloth) -> Vec<Self> {
         fan_groups(cloth, BendingModel::Hinge)
             .into_iter()
-            .map(|group| Self {
-                group,
-                rest_angles: Vec::new(),
-            })
+            .map(|group| Self { group })
             .collect()
-    }
-
-    /// Same with a rest angle for each hinge of [`hinges`] of the mesh's triangles [rad].
-    pub fn terms_with_rest_angles(cloth: &Cloth, angles: &[f64]) -> Result<Vec<Self>> {
-        let all = hinges(&cloth.mesh.triangles);
-        if all.len() != angles.len() {
-            return Err(Error::argument(format!(
-                "{} rest angles for {} hinges",
-                angles.len(),
-                all.len()
-            )));
-        }
-        if let Some(k) = angles.iter().position(|a| !a.is_finite()) {
-            return Err(Error::argument(format!(
-                "rest angle {} of hinge {k} is not finite",
-                angles[k]
-            )));
-        }
-        let mut terms = Self::terms(cloth);
-        for term in &mut terms {
-            let arity = term.group.arity;
-            for (e, fan) in term.group.fans.iter().enumerate() {
-                let vertices = &term.group.vertices[arity * e..][..arity];
-                let mut rest = [0.0; MAX_HINGES];
-                for (k, angle) in rest.iter_mut().enumerate().take(fan.hinge_count()) {
-                    let v = vertices[fan.local_hinge(k)[1]];
-                    let key = (vertices[0].min(v), vertices[0].max(v));
-                    if let Ok(h) = all.binary_search_by_key(&key, |h| (h[0], h[1])) {
-                        *angle = angles[h];
-                    }
-                }
-                term.rest_angles.push(rest);
-            }
-        }
-        Ok(terms)
-    }
-
-    fn rest_angle(&self, e: usize, k: usize) -> f64 {
-        self.rest_angles.get(e).map_or(0.0, |a| a[k])
     }
 
     fn vertices(&self, e: usize) -> &[u32] {
@@ -97,7 +52,7 @@ impl Hinge {
         let (mut now, mut since) = (Vec3::zeros(), Vec3::zeros());
         for (k, c) in weights.iter().enumerate() {
             let angle = dihedral(&gather(fan, k, vertices, at.x).1);
-            now += c * (angle - self.rest_angle(e, k));
+            now += c * (angle - fan.rest_angle(k));
             if rate {
                 let before = dihedral(&gather(fan, k, vertices, at.x0).1);
                 since += c * wrap_angle(angle - before);
@@ -266,7 +221,10 @@ impl Term for Hinge {
         );
         let damped = rate > 0.0 || drate != 0.0;
         let (now, since) = self.bend(e, at, &fan.measure.weights, damped);
-        let (dnow, dsince) = self.bend(e, at, &rates.weights, damped);
+        let (mut dnow, dsince) = self.bend(e, at, &rates.weights, damped);
+        for (k, c) in fan.measure.weights.iter().enumerate() {
+            dnow -= c * fan.rest_angle_rate(k, &rates, fabric);
+        }
         let (total, dtotal) = (now + since * rate, dnow + dsince * rate + since * drate);
         let moment = fan.stiffness * total;
         let dmoment = dstiffness * total + fan.stiffness * dtotal;

@@ -1,20 +1,21 @@
-//! Orthotropic Saint Venant-Kirchhoff membrane on constant-strain triangles.
+//! Orthotropic membrane on constant-strain triangles: Saint Venant-Kirchhoff and ridges.
 //!
 //! With material coordinates `X` (first axis weft, second axis warp), `F = dx/dX` (3x2) and the
 //! Green strain `E = (F^T F - I) / 2`, the energy of a triangle of rest area `A` is
 //!
 //! ```text
-//! V = A/2 e^T C e,   e = (E11, E22, 2 E12),   C = [weft c12 0; c12 warp 0; 0 0 shear]
+//! V = A (1/2 e^T C e + sum_r phi_r(d_r . e)),   e = (E11, E22, 2 E12),   C = [weft c12 0; c12 warp 0; 0 0 shear]
 //! ```
 //!
-//! Its Hessian is `A (B_i^T C B_j + (g_i . S g_j) I)` with `B_i = de/dx_i`, the gradients `g_i` of
-//! the shape functions and the second Piola-Kirchhoff stress `S = C e`. `Psd` takes the positive
+//! with the ridges `phi_r` of the fabric, if it has any ([`Ridge`]). Its Hessian is `A (B_i^T T B_j + (g_i . S g_j) I)` with
+//! `B_i = de/dx_i`, the tangent `T = C + sum_r phi_r'' d_r d_r^T`, which is positive definite, the gradients `g_i` of
+//! the shape functions and the second Piola-Kirchhoff stress `S = C e + sum_r phi_r' d_r`. `Psd` takes the positive
 //! part of `S` (stabilisation in compression, Umetani et al. 2011 section 5, after Teran et al.
 //! 2005): the first part is positive by itself, so that only the stress of a compressed triangle
 //! has to give way. Equilibria are not changed.
 //!
-//! Damping is Kelvin-Voigt, `beta/(2 dt) A (e - e0)^T C (e - e0)` with the strain `e0` at the start
-//! of the step: no force under rigid motion. SI units; a triangle may be inverted or without area
+//! Damping is Kelvin-Voigt, `beta/(2 dt) A (e - e0)^T T_0 (e - e0)` with the strain `e0` at the start
+//! of the step and the tangent `T_0` without strain: no force under rigid motion. SI units; a triangle may be inverted or without area
 //! in space (`F` is then singular, everything stays finite), not in its rest shape.
 
 use super::term::{Configuration, HessianKind, RestChange, Stencils, Term};
@@ -22,7 +23,7 @@ use crate::cloth::Cloth;
 use crate::math::geometry::cross2;
 use crate::math::spd::project2;
 use crate::math::{Mat2, Mat3, Vec2, Vec3};
-use crate::pattern::Fabric;
+use crate::pattern::{Fabric, Ridge};
 use nalgebra::{Matrix3, Matrix3x2};
 
 struct Element {
@@ -43,6 +44,10 @@ struct Element {
 pub struct Membrane {
     vertices: Vec<u32>,
     elements: Vec<Element>,
+    /// Ridges of each fabric.
+    ridges: Vec<Vec<Ridge>>,
+    /// Factor on all stiffness.
+    factor: f64,
 }
 
 /// Flat to (weft, warp) coordinates for a warp at `grain` from `+v`.
@@ -120,7 +125,18 @@ impl Membrane {
         Self {
             vertices: mesh.triangles.iter().flatten().copied().collect(),
             elements,
+            ridges: cloth.fabrics.iter().map(|f| f.ridges.clone()).collect(),
+            factor,
         }
+    }
+
+    /// Ridges of a triangle with their weights: the factor and the part that is the triangle's own, of `d d^T` as of `C`.
+    fn ridges<'a>(&'a self, element: &'a Element) -> impl Iterator<Item = (f64, &'a Ridge)> {
+        self.ridges[element.fabric].iter().map(move |ridge| {
+            let d = ridge.direction();
+            let own = d.component_mul(&element.share).norm_squared() / d.norm_squared();
+            (self.factor * own, ridge)
+        })
     }
 
     /// Green strain `(E11, E22, 2 E12)` of a triangle at positions `x`, weft first.
@@ -130,7 +146,14 @@ impl Membrane {
 
     /// Second Piola-Kirchhoff stress `(S11, S22, S12)` of a triangle without damping [N/m].
     pub fn stress(&self, e: usize, x: &[Vec3]) -> Vec3 {
-        self.elements[e].stiffness * self.strain(e, x)
+        let element = &self.elements[e];
+        let strain = self.strain(e, x);
+        let mut stress = element.stiffness * strain;
+        for (weight, ridge) in self.ridges(element) {
+            let d = ridge.direction();
+            stress += d * (weight * ridge.at(d.dot(&strain)).slope);
+        }
+        stress
     }
 
     fn deformation(&self, e: usize, x: &[Vec3]) -> Matrix3x2<f64> {
@@ -153,7 +176,12 @@ impl Membrane {
         } else {
             Vec3::zeros()
         };
-        let stress = element.stiffness * (strain_now + since * rate);
+        let mut stress = element.stiffness * (strain_now + since * rate);
+        for (weight, ridge) in self.ridges(element) {
+            let d = ridge.direction();
+            let damped = ridge.at(0.0).stiffness * d.dot(&since) * rate;
+            stress += d * (weight * (ridge.at(d.dot(&strain_now)).slope + damped));
+        }
         (strain_now, since, stress)
     }
 }
@@ -174,7 +202,14 @@ impl Term for Membrane {
         let element = &self.elements[e];
         let (now, since, _) = self.state(e, &self.deformation(e, at.x), at);
         let quadratic = |s: &Vec3| s.dot(&(element.stiffness * s));
-        0.5 * element.area * (quadratic(&now) + element.damping * at.inv_dt * quadratic(&since))
+        let rate = element.damping * at.inv_dt;
+        let mut energy = 0.5 * element.area * (quadratic(&now) + rate * quadratic(&since));
+        for (weight, ridge) in self.ridges(element) {
+            let d = ridge.direction();
+            let damped = 0.5 * rate * ridge.at(0.0).stiffness * d.dot(&since).powi(2);
+            energy += element.area * weight * (ridge.at(d.dot(&now)).energy + damped);
+        }
+        energy
     }
 
     fn gradient(&self, e: usize, at: &Configuration<'_>, out: &mut [Vec3]) {
@@ -190,11 +225,17 @@ impl Term for Membrane {
     fn hessian(&self, e: usize, at: &Configuration<'_>, kind: HessianKind, out: &mut [Mat3]) {
         let element = &self.elements[e];
         let f = self.deformation(e, at.x);
-        let (_, _, stress) = self.state(e, &f, at);
+        let (now, _, stress) = self.state(e, &f, at);
         let full = tensor(&stress);
         let positive = project2(&full);
         let s = positive + (full - positive) * kind.exactness();
-        let c = element.stiffness * (element.area * (1.0 + element.damping * at.inv_dt));
+        let rate = element.damping * at.inv_dt;
+        let mut c = element.stiffness * (element.area * (1.0 + rate));
+        for (weight, ridge) in self.ridges(element) {
+            let d = ridge.direction();
+            let tangent = ridge.at(d.dot(&now)).stiffness + rate * ridge.at(0.0).stiffness;
+            c += d * d.transpose() * (element.area * weight * tangent);
+        }
         let g = shape_gradients(&element.inverse);
         let (f1, f2) = (f.column(0), f.column(1));
         let b = g.map(|g| {
@@ -246,8 +287,14 @@ impl Term for Membrane {
         } else {
             (since, Vec3::zeros())
         };
-        let dstress = scaled(&stiffness(fabric), &element.share) * (now + since * damping)
+        let mut dstress = scaled(&stiffness(fabric), &element.share) * (now + since * damping)
             + element.stiffness * (dnow + dsince * damping + since * ddamping);
+        for (weight, ridge) in self.ridges(element) {
+            let d = ridge.direction();
+            let damped = d.dot(&dsince) * damping + d.dot(&since) * ddamping;
+            let tangent = ridge.at(d.dot(&now)).stiffness * d.dot(&dnow);
+            dstress += d * (weight * (tangent + ridge.at(0.0).stiffness * damped));
+        }
         let p = f * tensor(&stress);
         let dp = df * tensor(&stress) + f * tensor(&dstress);
         let (g, dg) = (

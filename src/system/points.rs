@@ -76,6 +76,12 @@ impl Points {
                 }
             }
         }
+        // an image stands for nothing more than its own does, but is as thick
+        for image in &yarns.mesh.images {
+            let [p, own] = [image.incidence, image.of]
+                .map(|i| self.vertex_count + yarns.mesh.incidences[i as usize].node as usize);
+            self.radii[p] = self.radii[own];
+        }
     }
 
     /// Number of points.

@@ -17,7 +17,11 @@ impl YarnMesh {
     /// The part that the nodes with `inside` reach, the number that each of its nodes has here, and that
     /// each passage has there, `u32::MAX` where it has none.
     pub fn part(&self, inside: &[bool]) -> (Self, Vec<u32>, Vec<u32>) {
-        let wanted = self.wanted(inside);
+        self.part_with(inside, &self.wanted(inside))
+    }
+
+    /// Same with more nodes outside than energies need, which have yarn between them but no energy.
+    pub(super) fn part_with(&self, inside: &[bool], wanted: &[bool]) -> (Self, Vec<u32>, Vec<u32>) {
         // pieces of yarns with at least one segment
         let mut pieces: Vec<(usize, std::ops::Range<usize>)> = Vec::new();
         for y in 0..self.yarn_count() {
@@ -100,7 +104,7 @@ impl YarnMesh {
     }
 
     /// Nodes that are inside or in an energy with one that is.
-    fn wanted(&self, inside: &[bool]) -> Vec<bool> {
+    pub(super) fn wanted(&self, inside: &[bool]) -> Vec<bool> {
         let mut wanted = inside.to_vec();
         let mut reach = |nodes: &[u32]| {
             if nodes.iter().any(|n| inside[*n as usize]) {

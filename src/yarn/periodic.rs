@@ -43,24 +43,29 @@ pub struct NodeImage {
 }
 
 impl YarnMesh {
-    /// The cell of a box with this size, one repeat, somewhere in the middle of these yarns.
-    pub fn periodic(&self, size: Vec2) -> Result<Periodic> {
+    /// The cell of a box with this size, one repeat, somewhere in the middle of these yarns, with images of all nodes
+    /// within `around` of the box.
+    pub fn periodic(&self, size: Vec2, around: Vec2) -> Result<Periodic> {
         let low = self.corner(size);
-        let inside: Vec<bool> = self
-            .uv
-            .iter()
-            .map(|uv| {
-                let d = uv - low;
-                d.x >= 0.0 && d.y >= 0.0 && d.x < size.x && d.y < size.y
-            })
-            .collect();
+        let within = |ring: Vec2| -> Vec<bool> {
+            let place = |uv: &Vec2| {
+                let (below, above) = (uv - low + ring, low + size + ring - uv);
+                below.min() >= 0.0 && above.min() > 0.0
+            };
+            self.uv.iter().map(place).collect()
+        };
+        let inside = within(Vec2::zeros());
         let count = inside.iter().filter(|i| **i).count();
         if count == 0 || count > MOST {
             return Err(Error::limit(format!(
                 "a repeat has {count} nodes, must have 1 to {MOST}"
             )));
         }
-        let (mut mesh, nodes, passages) = self.part(&inside);
+        let mut wanted = within(around);
+        for (near, needed) in wanted.iter_mut().zip(self.wanted(&inside)) {
+            *near |= needed;
+        }
+        let (mut mesh, nodes, passages) = self.part_with(&inside, &wanted);
         let mut laid_passage = vec![NONE; mesh.incidences.len()];
         for (laid, own) in passages.iter().enumerate() {
             if *own != NONE {

@@ -5,9 +5,8 @@
 use crate::sheets::{Flat, Pattern, Random, mesh, panel, rectangle};
 use nalgebra::DMatrix;
 use toile::cloth::Cloth;
-use toile::math::geometry::hinges;
 use toile::math::{Mat3, Rotation, Vec2, Vec3};
-use toile::pattern::{BendingModel, Fabric, Garment};
+use toile::pattern::{BendingModel, Fabric, Garment, Ridge};
 use toile::system::air::Air;
 use toile::system::gravity::Gravity;
 use toile::system::hinge::Hinge;
@@ -20,6 +19,19 @@ use toile::tri::{SeamLink, SeamMesh};
 
 pub const H: f64 = 0.02;
 
+/// Ridges in the plane and in shear, that stiffen, soften and vanish. The strain at rest is none of theirs: there third derivatives
+/// jump, and differences agree to first order only.
+fn ridges() -> Vec<Ridge> {
+    let ridge = |d: [f64; 3], strains: &[f64], stiffness: &[f64]| {
+        Ridge::new(d.into(), strains.to_vec(), stiffness.to_vec()).expect("valid ridge")
+    };
+    vec![
+        ridge([1.0, 1.0, 0.0], &[-0.2, 0.05, 0.4], &[100.0, 300.0, 2000.0]),
+        ridge([1.0, 0.0, 0.5], &[-0.02, 0.3], &[400.0, 0.0]),
+        ridge([0.0, 1.0, -0.5], &[-0.5, 0.1, 0.5], &[300.0, 0.0, 700.0]),
+    ]
+}
+
 pub fn fabrics() -> Vec<Fabric> {
     let hinge = Fabric {
         warp: 900.0,
@@ -28,12 +40,17 @@ pub fn fabrics() -> Vec<Fabric> {
         shear: 120.0,
         bending_warp: 3e-5,
         bending_weft: 1e-5,
+        curvature_warp: -8.0,
+        curvature_weft: 5.0,
         damping_stiffness: 0.02,
         ..Fabric::default()
     };
     let quadratic = Fabric {
         bending_model: BendingModel::Quadratic,
         bending_weft: 5e-5,
+        curvature_warp: 0.0,
+        curvature_weft: 0.0,
+        ridges: ridges(),
         ..hinge.clone()
     };
     vec![hinge, quadratic]
@@ -49,12 +66,16 @@ pub fn fabric_rate(random: &mut Random) -> Fabric {
         shear: 100.0 * random.signed(),
         bending_warp: 1e-5 * random.signed(),
         bending_weft: 1e-5 * random.signed(),
+        curvature_warp: 5.0 * random.signed(),
+        curvature_weft: 5.0 * random.signed(),
         damping_stiffness: 0.01 * random.signed(),
         ..Fabric::default()
     }
 }
 
 pub fn moved_fabric(f: &Fabric, rate: &Fabric, s: f64) -> Fabric {
+    // quadratic bending is flat
+    let bent = f64::from(u8::from(f.bending_model == BendingModel::Hinge));
     Fabric {
         density: f.density + s * rate.density,
         warp: f.warp + s * rate.warp,
@@ -63,6 +84,8 @@ pub fn moved_fabric(f: &Fabric, rate: &Fabric, s: f64) -> Fabric {
         shear: f.shear + s * rate.shear,
         bending_warp: f.bending_warp + s * rate.bending_warp,
         bending_weft: f.bending_weft + s * rate.bending_weft,
+        curvature_warp: f.curvature_warp + s * bent * rate.curvature_warp,
+        curvature_weft: f.curvature_weft + s * bent * rate.curvature_weft,
         damping_stiffness: f.damping_stiffness + s * rate.damping_stiffness,
         ..f.clone()
     }
@@ -144,13 +167,7 @@ pub fn terms(cloth: &Cloth) -> Vec<Box<dyn Term>> {
         Box::new(Air::new(cloth, 1.1, 0.05)),
         Box::new(Pressure::new(cloth)),
     ];
-    let rest: Vec<f64> = (0..hinges(&cloth.mesh.triangles).len())
-        .map(|k| 0.3 * (k as f64).sin())
-        .collect();
     for t in Hinge::terms(cloth) {
-        all.push(Box::new(t));
-    }
-    for t in Hinge::terms_with_rest_angles(cloth, &rest).expect("one angle for each hinge") {
         all.push(Box::new(t));
     }
     for t in QuadraticBending::terms(cloth) {

@@ -114,13 +114,16 @@ pub(crate) struct FabricArgs {
     /// Largest Green strain along the yarns; by default 0.01 for a weave, 0.1 for a knit.
     #[arg(long, value_name = "STRAIN")]
     pub(crate) stretch: Option<f64>,
+    /// Largest strain of a direction that is pressed together, 0 for no such tests; by default 0 for a weave, 0.1 for a knit.
+    #[arg(long, value_name = "STRAIN")]
+    pub(crate) press: Option<f64>,
     /// Largest shear strain, by default 0.1.
     #[arg(long, value_name = "STRAIN")]
     pub(crate) shear: Option<f64>,
     /// Largest curvature [1/m], by default 0.15 over the pitch.
     #[arg(long, value_name = "1/M")]
     pub(crate) curvature: Option<f64>,
-    /// Steps to the largest of each, by default 4.
+    /// Steps to the largest of each, by default 4 for a weave, 20 for a knit.
     #[arg(long, value_name = "N")]
     pub(crate) steps: Option<usize>,
 }

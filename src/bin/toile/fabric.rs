@@ -5,7 +5,7 @@ use crate::output::{Done, Failure, file, out};
 use std::fmt::Write;
 use std::path::Path;
 use toile::error::Error;
-use toile::fabric::fit::{BentSample, Fit, Range, TESTS, energy, fit};
+use toile::fabric::fit::{BentSample, Fit, Range, Sample, TESTS, errors, fit};
 use toile::pattern::export::fabric_to_json;
 use toile::pattern::import::fabric_from_json;
 use toile::readout::plot::{Curve, Plot};
@@ -32,6 +32,7 @@ pub(crate) fn fabric(args: &FabricArgs) -> Done {
     let usual = Range::of(yarns);
     let range = Range {
         stretch: args.stretch.unwrap_or(usual.stretch),
+        press: args.press.unwrap_or(usual.press),
         shear: args.shear.unwrap_or(usual.shear),
         curvature: args.curvature.unwrap_or(usual.curvature),
         steps: args.steps.unwrap_or(usual.steps),
@@ -64,15 +65,47 @@ fn table(fit: &Fit, range: &Range) -> String {
         (
             "its error of energy",
             format!(
-                "{:.2} % rms, {:.2} % largest; stretch to {}, shear to {}",
+                "{:.2} % rms, {:.2} % largest; stretch to {}, pressed to {}, shear to {}",
                 1e2 * fit.errors[0],
                 1e2 * fit.errors[1],
                 range.stretch,
+                range.press,
                 range.shear
             ),
         ),
     ] {
         let _ = writeln!(text, "{name:<24} {value}");
+    }
+    if let Some(ridged) = &fit.ridged {
+        let _ = writeln!(
+            text,
+            "{:<24} {} with {} strains; error of energy {:.2} % rms, {:.2} % largest",
+            "ridges",
+            ridged.ridges.len(),
+            ridged
+                .ridges
+                .iter()
+                .map(|r| r.strains().len())
+                .sum::<usize>(),
+            1e2 * ridged.errors[0],
+            1e2 * ridged.errors[1]
+        );
+    }
+    for (test, (name, _)) in TESTS.iter().enumerate() {
+        let own: Vec<Sample> = (fit.samples.iter().filter(|s| s.test == test))
+            .copied()
+            .collect();
+        if own.is_empty() {
+            continue;
+        }
+        let [mean, largest] = errors(&own, |e| fit.energy(e));
+        let _ = writeln!(
+            text,
+            "{:<24} {:.2} % rms, {:.2} % largest",
+            format!("  {name}"),
+            1e2 * mean,
+            1e2 * largest
+        );
     }
     for (name, bending) in
         [("bending.weft", 0), ("bending.warp", 1)].map(|(n, k)| (n, &fit.bending[k]))
@@ -87,10 +120,11 @@ fn table(fit: &Fit, range: &Range) -> String {
         );
     }
     let _ = writeln!(text, "{:<24} {}", "corrections", fit.corrections);
-    if fit.errors[0] > POOR {
+    let errors = fit.ridged.as_ref().map_or(fit.errors, |r| r.errors);
+    if errors[0] > POOR {
         let _ = writeln!(
             text,
-            "note: triangles of constant stiffness follow this fabric poorly: the material is no more than a mean over these strains"
+            "note: triangles follow this fabric poorly: the material is no more than a mean over these strains"
         );
     }
     text
@@ -106,18 +140,20 @@ fn write(fit: &Fit, range: &Range, dir: &Path) -> Result<(), Failure> {
     for (test, (name, direction)) in TESTS.iter().enumerate() {
         let part = |k: usize, of: usize| k as f64 / of as f64;
         let own = fit.samples.iter().filter(|s| s.test == test);
-        let points = (1..)
+        let points: Vec<[f64; 2]> = (1..)
             .zip(own)
-            .map(|(k, s)| [part(k, range.steps), s.energy]);
+            .map(|(k, s)| [part(k, range.steps), s.energy])
+            .collect();
+        if points.is_empty() {
+            continue;
+        }
         curves.push(Curve {
             name: format!("yarns: {name}"),
-            points: points.collect(),
+            points,
         });
         let material = |k: usize| {
             let t = part(k, POINTS);
-            let scale = [range.stretch, range.stretch, range.shear];
-            let e = [0, 1, 2].map(|i| t * direction[i] * scale[i]);
-            [t, energy(&fit.membrane, &e.into())]
+            [t, fit.energy(&(range.end(direction) * t))]
         };
         curves.push(Curve {
             name: format!("triangles: {name}"),

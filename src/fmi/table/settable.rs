@@ -197,6 +197,9 @@ impl Table {
         let names = names::unique(fabrics.iter().map(|f| f.name.as_str()));
         for (f, (fabric, name)) in fabrics.iter().zip(names).enumerate() {
             for &number in FabricNumber::ALL {
+                if fabric.fitted && number.is_fitted() {
+                    continue;
+                }
                 self.parameter(
                     format!("fabric.{name}.{}", number.name()),
                     Quantity::Fabric(f, number),

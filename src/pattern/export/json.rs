@@ -9,7 +9,7 @@ use crate::pattern::chart::Notation;
 use crate::pattern::curve::Curve;
 use crate::pattern::import::json::VERSION;
 use crate::pattern::yarn_fabric::Structure;
-use crate::pattern::{BendingModel, Edge, Fabric, Garment, Panel, Placement, YarnFabric};
+use crate::pattern::{BendingModel, Edge, Fabric, Garment, Panel, Placement, Ridge, YarnFabric};
 use serde_json::{Map, Value, json};
 use std::fmt::Write as _;
 
@@ -123,10 +123,34 @@ fn fabric_value(fabric: &Fabric) -> Result<Value> {
         "thickness": number(fabric.thickness)?,
         "friction": number(fabric.friction)?,
     });
+    for (key, curvature) in [
+        ("curvature_warp", fabric.curvature_warp),
+        ("curvature_weft", fabric.curvature_weft),
+    ] {
+        if curvature != 0.0 {
+            value["bending"][key] = number(curvature)?;
+        }
+    }
+    if !fabric.ridges.is_empty() {
+        let ridges = fabric.ridges.iter().map(ridge_value);
+        value["ridges"] = ridges.collect::<Result<Value>>()?;
+    }
+    if fabric.fitted {
+        value["triangles"] = json!("fitted");
+    }
     if let Some(yarns) = &fabric.yarns {
         value["yarns"] = yarns_value(yarns)?;
     }
     Ok(value)
+}
+
+fn ridge_value(ridge: &Ridge) -> Result<Value> {
+    let numbers = |list: &[f64]| list.iter().map(|x| number(*x)).collect::<Result<Value>>();
+    Ok(json!({
+        "direction": numbers(ridge.direction().as_slice())?,
+        "strain": numbers(ridge.strains())?,
+        "stiffness": numbers(ridge.stiffness())?,
+    }))
 }
 
 fn yarns_value(yarns: &YarnFabric) -> Result<Value> {

@@ -22,7 +22,7 @@ use super::read::{Node, Object, parse};
 use super::schema;
 use super::yarns::read_yarns;
 use crate::error::{Error, Result};
-use crate::pattern::{BendingModel, Fabric};
+use crate::pattern::{BendingModel, Fabric, Ridge};
 
 /// Reads a fabric, either kind; the notes say what the file holds that was not used.
 pub fn fabric_from_json(text: &str) -> Result<(Fabric, Vec<String>)> {
@@ -71,11 +71,20 @@ fn read_own(object: &Object<'_>) -> Result<Fabric> {
             (None, None) => fabric.coupling,
         };
     }
+    if let Some(node) = object.get("ridges") {
+        fabric.ridges = node
+            .array()?
+            .iter()
+            .map(read_ridge)
+            .collect::<Result<_>>()?;
+    }
     if let Some(node) = object.get("bending") {
         let bending = node.object()?;
         bending.only(schema::BENDING)?;
         fabric.bending_warp = bending.number_or("warp", fabric.bending_warp)?;
         fabric.bending_weft = bending.number_or("weft", fabric.bending_weft)?;
+        fabric.curvature_warp = bending.number_or("curvature_warp", fabric.curvature_warp)?;
+        fabric.curvature_weft = bending.number_or("curvature_weft", fabric.curvature_weft)?;
         if let Some(model) = bending.get("model") {
             fabric.bending_model = match model.text()? {
                 "hinge" => BendingModel::Hinge,
@@ -94,8 +103,32 @@ fn read_own(object: &Object<'_>) -> Result<Fabric> {
         fabric.damping_mass = damping.number_or("mass", fabric.damping_mass)?;
         fabric.damping_stiffness = damping.number_or("stiffness", fabric.damping_stiffness)?;
     }
+    if let Some(node) = object.get("triangles") {
+        fabric.fitted = match node.text()? {
+            "given" => false,
+            "fitted" => true,
+            other => {
+                return Err(node.error(format!("must be \"given\" or \"fitted\", is {other:?}")));
+            }
+        };
+    }
     fabric.yarns = object.get("yarns").map(|n| read_yarns(&n)).transpose()?;
     Ok(fabric)
+}
+
+fn read_ridge(node: &Node<'_>) -> Result<Ridge> {
+    let object = node.object()?;
+    object.only(schema::RIDGE)?;
+    let numbers = |key: &str| -> Result<Vec<f64>> {
+        object
+            .need(key)?
+            .array()?
+            .iter()
+            .map(Node::number)
+            .collect()
+    };
+    let direction = object.need("direction")?.vec3()?;
+    Ridge::new(direction, numbers("strain")?, numbers("stiffness")?).map_err(|e| e.at(&node.path))
 }
 
 fn read_measured(object: &Object<'_>) -> Result<(Fabric, Vec<String>)> {
@@ -226,5 +259,26 @@ mod tests {
         let error = fabric_from_json(r#"{"membrane": {"warp": "3"}}"#).unwrap_err();
         assert!(error.message.starts_with("membrane.warp:"), "{error}");
         assert!(fabric_from_json(r#"{"density": -1}"#).is_err());
+    }
+
+    #[test]
+    fn ridges_come_back_from_json_and_bad_ones_name_their_place() {
+        let text = r#"{"ridges": [{"direction": [1, 0.5, 0], "strain": [-0.1, 0.2], "stiffness": [0, 40]},
+            {"direction": [0, 0, 1], "strain": [0], "stiffness": [3]}]}"#;
+        let (fabric, _) = fabric_from_json(text).unwrap();
+        assert_eq!(fabric.ridges.len(), 2);
+        assert_eq!(fabric.ridges[0].stiffness(), [0.0, 40.0]);
+        let again = crate::pattern::export::fabric_to_json(&fabric).unwrap();
+        assert_eq!(fabric_from_json(&again).unwrap().0, fabric);
+        for (from, to, place) in [
+            ("[0, 40]", "[0, -40]", "ridges[0]: stiffness[1] = -40"),
+            ("[0, 40]", "[0]", "ridges[0]: 2 strains and 1"),
+            ("[-0.1, 0.2]", "[0.2, 0.2]", "ridges[0]: strain[1] = 0.2"),
+            ("[0, 0, 1]", "[0, 0]", "ridges[1].direction"),
+            ("\"strain\": [0]", "\"strains\": [0]", "ridges[1].strains"),
+        ] {
+            let error = fabric_from_json(&text.replace(from, to)).unwrap_err();
+            assert!(error.message.contains(place), "{place}: {error}");
+        }
     }
 }

@@ -288,6 +288,20 @@ pub const FABRIC: &[Key] = &[
         "see there",
         "stiffness in the plane",
     ),
+    key(
+        "triangles",
+        "text",
+        "",
+        "given",
+        "\"given\", or \"fitted\": density, membrane, ridges and bending are those fitted to the yarns when a simulation is made",
+    ),
+    key(
+        "ridges",
+        "array of ridges",
+        "",
+        "none",
+        "convex functions of the strain beside the membrane's stiffness",
+    ),
     key("bending", "object", "", "see there", "flexural rigidity"),
     key("damping", "object", "", "see there", "Rayleigh damping"),
     key(
@@ -340,6 +354,31 @@ pub const MEMBRANE: &[Key] = &[
     ),
 ];
 
+/// Keys of a ridge of a fabric's membrane.
+pub const RIDGE: &[Key] = &[
+    key(
+        "direction",
+        "[weft, warp, shear]",
+        "",
+        "required",
+        "d of the strain s = d . (E11, E22, 2 E12)",
+    ),
+    key(
+        "strain",
+        "array of numbers",
+        "",
+        "required",
+        "growing strains s at which the stiffness is given, constant beyond them",
+    ),
+    key(
+        "stiffness",
+        "array of numbers",
+        "N/m",
+        "required",
+        "second derivative of the energy by s there, not negative",
+    ),
+];
+
 /// Keys of a fabric's bending.
 pub const BENDING: &[Key] = &[
     key(
@@ -356,6 +395,14 @@ pub const BENDING: &[Key] = &[
         "1e-5",
         "rigidity per width against curving the weft",
     ),
+    key(
+        "curvature_warp",
+        "number",
+        "1/m",
+        "0",
+        "curvature of the warp at rest, positive to the front; hinges only",
+    ),
+    key("curvature_weft", "number", "1/m", "0", "same of the weft"),
     key(
         "model",
         "text",
@@ -382,6 +429,7 @@ pub const TABLES: &[(&str, &[Key])] = &[
     ("garment.blend_regions[]", BLEND_REGION),
     ("garment.fabrics[]", FABRIC),
     ("garment.fabrics[].membrane", MEMBRANE),
+    ("garment.fabrics[].ridges[]", RIDGE),
     ("garment.fabrics[].bending", BENDING),
     ("garment.fabrics[].damping", DAMPING),
     ("garment.fabrics[].yarns", super::yarns::YARNS),

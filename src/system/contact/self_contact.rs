@@ -18,7 +18,7 @@
 //! `c` is zero except for pairs that meet in a plane: coincident panels have no side to be pushed
 //! to. Then `c` points along the outside normal of the cloth at `a` (or against it, where `b` already
 //! is on that side by 0.001 `d0`), 0.02 `d0` long: enough for the forces to have a way out, and the same
-//! way for all neighbours, however a relaxation disturbs them.
+//! way for all neighbours, however a relaxation disturbs them. Nodes of yarns have it only where they are nearer than that.
 //!
 //! Spheres do not slip off each other's cloth as planes would: layers feel a bumpy surface, with
 //! bumps of the order of the square of the edge length over the radius. Layers lie `d0` apart at
@@ -201,11 +201,11 @@ impl SelfContact {
     fn pair(&self, [a, b]: [u32; 2], x: &[Vec3], anchor: Option<&PairAnchor>, dt: f64) -> Pair {
         let distance = self.spheres.rest_distance(a, b);
         let w = x[b as usize] - x[a as usize];
-        let outside = match self.normals[a as usize] {
-            n if n == Vec3::zeros() => Vec3::y(),
-            n => n,
+        // nodes of yarns have no side: they meet in a plane only where they coincide
+        let (outside, height) = match self.normals[a as usize] {
+            n if n == Vec3::zeros() => (Vec3::y(), w.norm()),
+            n => (n, w.dot(&n)),
         };
-        let height = w.dot(&outside);
         let bias = if height.abs() < FLAT * distance && w.norm() < distance {
             let below = height < -COINCIDENT * distance;
             outside * (FLAT * distance * if below { -1.0 } else { 1.0 })

@@ -34,7 +34,7 @@
 //! A node's sphere has the radius of the yarn. Segments are ways like edges, and so is the way from a node that rides
 //! on a triangle or is blended into it to the triangle's vertices; a node and another point of its panel are
 //! neighbours if the straight line between them is short, since yarns of one layer touch. Nodes that have become neighbours
-//! because yarns have slid are so too ([`rods`](super::rods)).
+//! because yarns have slid are so too ([`rods`](super::rods)). Images of a periodic cell are nodes like others.
 
 use super::rods::Rods;
 use crate::cloth::Cloth;
@@ -120,6 +120,10 @@ impl Spheres {
         let coupling = &points.coupling;
         let blended = coupling.filter.iter().flat_map(|f| f.nodes());
         for rider in coupling.riders.list().iter().chain(blended) {
+            // images lie as far from others as their yarns say
+            if rider.vertices[0] as usize >= uv.len() {
+                continue;
+            }
             let place = |v: u32| uv[v as usize];
             let carried = rider.vertices.iter().zip(&rider.weights);
             let own: Vec2 = carried.map(|(v, w)| place(*v) * *w).sum();
