@@ -255,7 +255,7 @@ impl Engine {
             idle: &self.idle,
             workers: &self.workers,
         };
-        let tolerance = Tolerance {
+        let mut tolerance = Tolerance {
             displacement: if dynamic {
                 self.settings.newton_velocity_tolerance * h
             } else {
@@ -266,6 +266,7 @@ impl Engine {
             } else {
                 0.0
             },
+            first: None,
             motion: if dynamic && system.has_yarns() {
                 self.settings.yarn_relative_velocity
             } else {
@@ -351,6 +352,8 @@ impl Engine {
             if inadmissible(system, &at, false, &self.workers).is_none()
                 && problem.value(&ahead).is_finite()
             {
+                // stiff yarns have much energy there, which is no measure of what the step has to find
+                tolerance.first = Some(problem.value(&x)).filter(|first| first.is_finite());
                 x = ahead;
             }
         }

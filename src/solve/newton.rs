@@ -35,6 +35,8 @@ pub struct Tolerance {
     pub displacement: f64,
     /// Decrease of `Phi` in an iteration over that in all of them.
     pub relative: f64,
+    /// What the decrease in all of them is counted from [J], where that is not the start.
+    pub first: Option<f64>,
     /// A full correction over the whole displacement, both as root mean squares weighted by what
     /// inertia resists with.
     pub motion: f64,
@@ -320,7 +322,7 @@ impl Problem<'_> {
         }
         let mut exactness = tolerance.exactness;
         let mut doubts = 0;
-        let first = value;
+        let first = tolerance.first.unwrap_or(value);
         for iteration in 0..tolerance.iterations {
             loop {
                 let kept = linear.keeps(assembler.matrix());
