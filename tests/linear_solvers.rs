@@ -334,6 +334,15 @@ fn the_choice_follows_its_number() {
         let mut automatic = solver(0, n, Made::Yarns, &Workers::default());
         automatic.prepare(&case.matrix).expect("prepares");
         assert_eq!(automatic.name(), expected, "{n} blocks of yarns, step {h}");
+        if expected == "cg_schwarz" {
+            // refused by a part, without a factor of the whole
+            let mut matrix = case.matrix;
+            let diagonal = matrix.pattern.starts[n / 2] as usize;
+            matrix.blocks[diagonal] = -matrix.blocks[diagonal];
+            let refused = automatic.prepare(&matrix);
+            assert_eq!(refused, Err(LinearError::NotPositiveDefinite));
+            assert_eq!(automatic.name(), expected);
+        }
     }
     for (n, h, expected) in [
         (1_600, 1e-2, "cg_ic0"),

@@ -107,13 +107,10 @@ fn incomplete(made: Made<'_>) -> ConjugateGradients {
 /// Chooses for each matrix; what the others refuse is solved directly.
 pub struct Automatic {
     direct: Direct,
+    yarns: bool,
     /// For matrices in which inertia has a say.
     near: ConjugateGradients,
-    /// Stiffness over mass up to which that is tried.
-    crossover: f64,
     factored: ConjugateGradients,
-    /// Blocks below which a matrix is factored as it is, in motion and in all else.
-    always_direct: [usize; 2],
     chosen: Choice,
     /// Whether `near` was not enough for a matrix since the last `forget`.
     slow: bool,
@@ -134,18 +131,12 @@ impl Automatic {
         let yarns = matches!(made, Made::Yarns);
         Self {
             direct: Direct::new(workers),
+            yarns,
             near: if yarns {
                 parted(workers)
             } else {
                 incomplete(made)
             },
-            crossover: if yarns {
-                CROSSOVER_RATIO_YARNS
-            } else {
-                CROSSOVER_RATIO
-            },
-            // yarns begin and cease to slide: their blocks are counted in each matrix
-            always_direct: if yarns { ALWAYS_DIRECT_YARNS } else { [0; 2] },
             factored: factored(workers),
             chosen: Choice::Direct,
             slow: false,
@@ -205,11 +196,22 @@ impl LinearSolver for Automatic {
     }
 
     fn prepare(&mut self, matrix: &BlockMatrix) -> Result<(), LinearError> {
-        let direct = self.always_direct.map(|least| matrix.n() < least);
-        if !direct[0] && !self.slow && self.stiffness_ratio(matrix) < self.crossover {
+        // yarns begin and cease to slide: their blocks are counted in each matrix
+        let direct = ALWAYS_DIRECT_YARNS.map(|least| self.yarns && matrix.n() < least);
+        let crossover = if self.yarns {
+            CROSSOVER_RATIO_YARNS
+        } else {
+            CROSSOVER_RATIO
+        };
+        if !direct[0] && !self.slow && self.stiffness_ratio(matrix) < crossover {
             self.chosen = Choice::Near;
-            if self.near.prepare(matrix).is_ok() {
-                return Ok(());
+            match self.near.prepare(matrix) {
+                Ok(()) => return Ok(()),
+                // a part that is not positive definite tells of the whole, an incomplete factor does not
+                Err(LinearError::NotPositiveDefinite) if self.yarns => {
+                    return Err(LinearError::NotPositiveDefinite);
+                }
+                Err(_) => {}
             }
         }
         self.chosen = Choice::Factored;
