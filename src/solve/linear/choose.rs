@@ -22,8 +22,8 @@
 //! Yarns, whose stretch is 1e4 times as stiff as their bending, have a `rho` of 1e5 at 1 ms. Incomplete factors take hundreds of
 //! iterations there; in motion large systems of yarns get factors of overlapping parts
 //! ([`super::schwarz`]), and every matrix of small ones is factored as a whole. In a hanging swatch of 16 772
-//! nodes at 1 ms, six steps took 67 s by parts on a busy machine, and more than 130 s, where they were stopped, by
-//! incomplete or by whole factors.
+//! nodes at 1 ms a correction takes 30 us a node by parts and 50 to 56 by factors of the whole, on one thread; at
+//! 4 292 nodes they take the same.
 //!
 //! `rho` is read off the matrix: internal stiffness has zero row sums, so what a row's blocks sum
 //! to is its mass term, and `rho` is the median over vertices of trace(diagonal block) over
