@@ -2,7 +2,7 @@
 #   make demo    build, compile a C host, drape a garment on a body, leave a picture and a model file
 #   make test    the whole check, the same as on the build machine
 #   make quick   unit tests only, under a minute once built
-#   make bench   tables of speed and error; bench-yarn: those of yarns
+#   make bench   tables of speed and error; bench-yarn: those of yarns; bench-mixed: of mixed cloth
 #   make fuzz    every fuzz target, FUZZ_SECONDS (20) each
 #   make soak    the long random runs, fuzz targets included
 #   make wheel   the Python package with the library as one file, in out/wheels
@@ -17,7 +17,7 @@ LIB    := target/release/libtoile.so
 PYTHON := target/venv/bin/python
 export TOILE_PYTHON ?= $(abspath $(PYTHON))
 
-.PHONY: all demo test quick bench bench-yarn fuzz soak header wheel install tools lint clean
+.PHONY: all demo test quick bench bench-yarn bench-mixed fuzz soak header wheel install tools lint clean
 
 all:
 	$(CARGO) build --release
@@ -51,6 +51,10 @@ bench-yarn: all
 	$(CARGO) bench --bench yarn
 	$(CARGO) bench --bench yarn_terms
 	$(CARGO) bench --bench yarn_fabrics
+
+bench-mixed: all
+	$(CARGO) bench --bench mixed
+	$(CARGO) bench --bench rings
 
 fuzz:
 	@bash scripts/fuzz.sh $(FUZZ_SECONDS)

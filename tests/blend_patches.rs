@@ -215,3 +215,88 @@ fn pins_bear_blended_cloth() {
         );
     }
 }
+
+/// Steps by conjugate gradients under the filter go where direct ones do, to a thousandth of the motion, and keep the
+/// constraints as well.
+#[test]
+fn blended_steps_do_not_depend_on_the_linear_solver() {
+    let text = ringed(&square(0.03, 0.005, &[MIDDLE]), 1);
+    let run = |kind: f64| {
+        let numbers = [
+            ("solver.linear.kind", kind),
+            ("solver.linear.tolerance", 1e-6),
+            ("solver.newton.velocity_tolerance", 1e-6),
+            ("yarn.relative_velocity", 0.0),
+            ("yarn.sliding", 0.0),
+        ];
+        let mut sim = held_by_its_corners(&text, &numbers);
+        for _ in 0..4 {
+            let _ = sim.step(2e-3).expect("step");
+        }
+        sim
+    };
+    let direct = run(1.0);
+    assert_eq!(direct.info().backend, "constrained_cholesky");
+    let start = held_by_its_corners(&text, &[]);
+    let norm = |a: &[Vec3], b: &[Vec3]| {
+        let sum: f64 = a.iter().zip(b).map(|(a, b)| (a - b).norm_squared()).sum();
+        sum.sqrt()
+    };
+    let moved = norm(direct.points(), start.points());
+    for (kind, name) in [
+        (2.0, "cg_filtered_two_levels"),
+        (5.0, "cg_filtered_schwarz_two_levels"),
+    ] {
+        let iterated = run(kind);
+        assert_eq!(iterated.info().backend, name);
+        assert!(iterated.constraint_violation() <= 1e-10 * 0.03);
+        let apart = norm(direct.points(), iterated.points()) / moved;
+        println!("{name}: {apart:.1e} of the motion from the direct one");
+        assert!(apart < 1e-3, "{apart}");
+    }
+}
+
+/// A patch hangs from vertices of its ring: conjugate gradients go where the direct solver goes, and the held vertices stay. The soft ends
+/// of yarns in the ring buckle: what the solver leaves grows a millionfold in a step, so the tolerance is tight.
+#[test]
+fn vertices_of_rings_are_held_by_every_solver() {
+    let region = "[[-1, -1], [0.0205, -1], [0.0205, 1], [-1, 1]]";
+    let text = ringed(&square(0.03, 0.005, &[region]), 1);
+    let run = |kind: f64| {
+        let numbers = [
+            ("solver.linear.kind", kind),
+            ("solver.linear.tolerance", 1e-10),
+            ("solver.newton.velocity_tolerance", 1e-6),
+            ("yarn.relative_velocity", 0.0),
+            ("yarn.sliding", 0.0),
+        ];
+        let mut sim = sim(&text, -9.81, &numbers);
+        let held: Vec<u32> = (0..)
+            .zip(sim.vertex_uv())
+            .zip(sim.active_vertices())
+            .filter(|((_, p), active)| *active && p.y > 0.03 - 1e-9)
+            .map(|p| p.0.0)
+            .collect();
+        assert!(held.len() >= 2, "{held:?}");
+        sim.pin(&held, None).expect("pin");
+        let before: Vec<Vec3> = held.iter().map(|v| sim.positions()[*v as usize]).collect();
+        for _ in 0..3 {
+            let _ = sim.step(2e-3).expect("step");
+        }
+        let after: Vec<Vec3> = held.iter().map(|v| sim.positions()[*v as usize]).collect();
+        assert_eq!(before, after);
+        sim.points().to_vec()
+    };
+    let direct = run(1.0);
+    let lowest = |x: &[Vec3]| x.iter().map(|p| p.y).fold(f64::INFINITY, f64::min);
+    for kind in [2.0, 5.0] {
+        let iterated = run(kind);
+        let apart = direct.iter().zip(&iterated).map(|(a, b)| (a - b).norm());
+        let apart = apart.fold(0.0, f64::max);
+        println!(
+            "solver {kind}: {apart:.1e} m apart, lowest {:.3e} m",
+            lowest(&direct)
+        );
+        assert!(apart < 1e-8, "{apart:e}");
+    }
+}

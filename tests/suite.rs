@@ -9,6 +9,7 @@
 mod capi_support;
 mod common_data;
 mod linear_cases;
+mod ring_cases;
 mod self_contact_cases;
 mod sheets;
 mod terms_cases;

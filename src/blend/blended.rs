@@ -117,6 +117,10 @@ pub fn join(
     bare.sort_unstable();
     bare.dedup();
     bare.retain(|v| !with_triangles[*v as usize]);
+    let carriers = (first..).zip(&nodes).map(|(point, node)| {
+        let place = places.rider(mesh, *node, *node as usize);
+        Rider { point, ..place }
+    });
     let filter = if blended.is_empty() {
         None
     } else {
@@ -125,6 +129,8 @@ pub fn join(
             triangles: if options.means { triangles } else { Vec::new() },
             nodes: blended,
             bare,
+            carriers: carriers.collect(),
+            covered: with_triangles,
         };
         let filter = Filter::new(parts)?;
         check_support(garment, mesh, &filter)?;

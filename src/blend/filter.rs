@@ -45,6 +45,8 @@ pub struct Filter {
     bare: Vec<u32>,
     /// Nodes that hold the yarns when the triangles are away.
     anchors: Vec<u32>,
+    carriers: Vec<Rider>,
+    covered: Vec<bool>,
 }
 
 /// What a filter is made of.
@@ -58,6 +60,10 @@ pub struct Parts {
     pub bare: Vec<u32>,
     /// A few nodes of each piece of yarn, without which nothing but the constraints would hold the piece.
     pub anchors: Vec<u32>,
+    /// Every node of the yarns by point, with its triangle, be it in a ring or not.
+    pub carriers: Vec<Rider>,
+    /// For each vertex whether it has triangles that are simulated.
+    pub covered: Vec<bool>,
 }
 
 impl Filter {
@@ -130,6 +136,8 @@ impl Filter {
             amplification,
             bare: parts.bare,
             anchors: parts.anchors,
+            carriers: parts.carriers,
+            covered: parts.covered,
         })
     }
 
@@ -156,6 +164,22 @@ impl Filter {
     /// Nodes that hold the yarns when the triangles are away.
     pub fn anchors(&self) -> &[u32] {
         &self.anchors
+    }
+
+    /// The triangle that a node lies in, by point.
+    pub fn carrier(&self, point: u32) -> Option<&Rider> {
+        let first = self.carriers.first()?.point;
+        self.carriers.get(point.checked_sub(first)? as usize)
+    }
+
+    /// Number of vertices, simulated or not.
+    pub fn vertex_count(&self) -> usize {
+        self.covered.len()
+    }
+
+    /// Whether a vertex has triangles that are simulated.
+    pub fn is_covered(&self, vertex: u32) -> bool {
+        self.covered[vertex as usize]
     }
 
     /// Largest row sum of `|B^+|`: how far a vertex may go when each node goes by one.
@@ -269,6 +293,20 @@ impl Filter {
         let mut r = self.collect(|i| gradient[self.nodes[i].point as usize]);
         self.factor.solve(&mut r);
         self.subtract(&r, gradient);
+    }
+
+    /// A residual by `(v, p)` without what it has along `C^T`: `r - C^T G^-1 E^T r_p`, which does the same work in every motion that
+    /// the constraints admit.
+    pub fn restrict(&self, residual: &mut [Vec3]) {
+        let mut r = self.collect(|i| residual[self.nodes[i].point as usize]);
+        self.factor.solve(&mut r);
+        for (i, node) in self.nodes.iter().enumerate() {
+            let part: Vec3 = self.entries(i).map(|(column, e)| r[column] * e).sum();
+            residual[node.point as usize] -= part;
+            for (v, w) in node.vertices.iter().zip(&node.weights) {
+                residual[*v as usize] += part * *w;
+            }
+        }
     }
 
     /// How far the constraints are from holding: the largest weighted mean of `p - B v` over the nodes of a column.

@@ -493,8 +493,8 @@ fn exact_solver(system: &System, workers: &Workers) -> Box<dyn LinearSolver> {
 }
 
 fn linear_solver(system: &System, settings: &Settings, workers: &Workers) -> Box<dyn LinearSolver> {
-    if system.points.coupling.filter.is_some() {
-        return exact_solver(system, workers);
+    if let Some(filter) = &system.points.coupling.filter {
+        return choose::filtered(settings.linear_kind as u32, filter, workers);
     }
     let (kind, blocks) = (settings.linear_kind as u32, system.block_count());
     if system.has_yarns() {

@@ -31,17 +31,21 @@
 //! are few. The choice is a function of the matrices since the last [`LinearSolver::forget`], so that a
 //! restored run takes the same.
 
+use super::constrained::Constrained;
 use super::direct::Direct;
 use super::factored::SingleFactor;
+use super::filtered::{Beside, Filtered};
 use super::ic0::{IncompleteCholesky, Order, Storage};
 use super::jacobi::BlockJacobi;
 use super::pcg::ConjugateGradients;
 use super::schwarz::Schwarz;
 use super::stiff_part::StiffPart;
 use super::{LinearError, LinearSolver};
+use crate::blend::Filter;
 use crate::math::block::BlockMatrix;
 use crate::math::parallel::Workers;
 use crate::math::{Mat3, Vec3};
+use std::sync::Arc;
 
 /// Stiffness over mass below which incomplete factors are enough.
 const CROSSOVER_RATIO: f64 = 2e4;
@@ -84,6 +88,22 @@ pub fn solver(kind: u32, n: usize, made: Made<'_>, workers: &Workers) -> Box<dyn
         _ if n < ALWAYS_DIRECT => Box::new(Direct::new(workers)),
         _ => Box::new(Automatic::new(made, workers)),
     }
+}
+
+/// A solver under the constraints of blended rings, by the same numbers: 2 and 3 are conjugate gradients with diagonal blocks, 4 and 5
+/// with factors of overlapping parts, both with the triangles as a second level.
+pub fn filtered(kind: u32, filter: &Arc<Filter>, workers: &Workers) -> Box<dyn LinearSolver> {
+    // vertices without energies have no diagonal blocks
+    let beside = match kind {
+        2 | 3 if filter.bare().is_empty() => Beside::Blocks,
+        4 | 5 if filter.bare().is_empty() => Beside::Parts,
+        _ => return Box::new(Constrained::new(filter, workers)),
+    };
+    let costly = beside == Beside::Parts;
+    let levels = Box::new(Filtered::new(filter, beside, true, workers));
+    let cg = ConjugateGradients::new(levels);
+    // diagonal blocks are cheap to make and take too many iterations to end early
+    Box::new(if costly { cg.for_newton(KEPT[1]) } else { cg })
 }
 
 fn factored(workers: &Workers) -> ConjugateGradients {

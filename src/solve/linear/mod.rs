@@ -4,7 +4,8 @@
 //! * [`pcg`]: conjugate gradients with a [`pcg::Preconditioner`]: [`jacobi`] (3x3 diagonal blocks),
 //!   [`ic0`] (incomplete Cholesky on the pattern of `A`, in an [`ordering`]), [`factored`] (the
 //!   complete factor of an earlier matrix, of its [`stiff_part`]) or [`schwarz`] (factors of overlapping parts of the [`graph`]).
-//! * [`constrained`]: the same with linear constraints between the unknowns, of blended rings.
+//! * [`constrained`]: the same with linear constraints between the unknowns, of blended rings;
+//!   [`filtered`] is a preconditioner under these.
 //! * [`choose`]: which of them, by number or by measured crossover.
 
 mod cholesky;
@@ -12,6 +13,7 @@ pub mod choose;
 pub mod constrained;
 pub mod direct;
 pub mod factored;
+pub mod filtered;
 pub mod graph;
 pub mod ic0;
 pub mod jacobi;

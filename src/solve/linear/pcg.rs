@@ -16,6 +16,15 @@ use crate::math::block::{BlockMatrix, BlockPattern};
 pub trait Preconditioner: Send {
     /// Stable name of the solver made with it, as in reports.
     fn solver_name(&self) -> &'static str;
+    /// Blocks whose rows the next matrices have as those of the identity. Whether it has to be prepared anew for that.
+    fn hold(&mut self, fixed: &[bool]) -> bool {
+        let _ = fixed;
+        false
+    }
+    /// Replaces a residual by an equal one under constraints that the preconditioner keeps.
+    fn project(&mut self, r: &mut [Vec3]) {
+        let _ = r;
+    }
     /// Takes a new matrix. Keeps what depends on the pattern alone while that stays the same.
     fn prepare(&mut self, matrix: &BlockMatrix) -> Result<(), LinearError>;
     /// Drops what was decided by the values of earlier matrices.
@@ -93,6 +102,12 @@ impl LinearSolver for ConjugateGradients {
         self.preconditioner.solver_name()
     }
 
+    fn hold(&mut self, fixed: &[bool]) {
+        if self.preconditioner.hold(fixed) {
+            self.discard();
+        }
+    }
+
     fn prepare(&mut self, matrix: &BlockMatrix) -> Result<(), LinearError> {
         for work in [&mut self.r, &mut self.z, &mut self.p, &mut self.q] {
             work.resize(matrix.n(), Vec3::zeros());
@@ -127,7 +142,9 @@ impl LinearSolver for ConjugateGradients {
             return Err(LinearError::NoConvergence);
         }
         x.fill(Vec3::zeros());
-        let goal = dot(b, b) * tolerance * tolerance;
+        self.r.copy_from_slice(b);
+        self.preconditioner.project(&mut self.r);
+        let goal = dot(&self.r, &self.r) * tolerance * tolerance;
         if goal == 0.0 && b.iter().all(|v| *v == Vec3::zeros()) {
             return Ok(0);
         }
@@ -137,7 +154,6 @@ impl LinearSolver for ConjugateGradients {
         let limit = self
             .limit
             .unwrap_or(500 + (60.0 * (3.0 * n as f64).sqrt()) as u32);
-        self.r.copy_from_slice(b);
         let mut iterations = 0;
         for _ in 0..=RESTARTS {
             let done = self.iterate(matrix, x, goal, limit, &mut iterations);
@@ -157,6 +173,7 @@ impl LinearSolver for ConjugateGradients {
             for i in 0..n {
                 self.r[i] = b[i] - self.q[i];
             }
+            self.preconditioner.project(&mut self.r);
             if dot(&self.r, &self.r) <= goal {
                 return Ok(iterations);
             }
@@ -207,12 +224,12 @@ impl ConjugateGradients {
                 return Err(LinearError::NotPositiveDefinite);
             }
             let alpha = rz / curvature;
-            rr = 0.0;
             for i in 0..x.len() {
                 x[i] += alpha * self.p[i];
                 self.r[i] -= alpha * self.q[i];
-                rr += self.r[i].norm_squared();
             }
+            self.preconditioner.project(&mut self.r);
+            rr = dot(&self.r, &self.r);
             self.preconditioner.apply(&self.r, &mut self.z);
             let next = dot(&self.r, &self.z);
             let beta = next / rz;

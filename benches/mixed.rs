@@ -1,0 +1,352 @@
+//! Yarns everywhere against yarns where they matter, in one run with one step and one tolerance.
+//!
+//! *Puckering* (Casafranca et al. 2020, figure 4 and table 1): two patches of a plain weave, the one a tenth longer along
+//! the seam, which stretches the other; yarns within a strip along the seam, triangles of 12 pitches beyond. *Dress* (figure 9):
+//! GarmentCode's pencil dress of a weave, draped on a body as triangles; then yarns are laid on the chest, or everywhere. The dress needs
+//! `TOILE_DATA`. Cloth does not touch itself: yarns of different places do not either. Every model goes from the same places through the same steps of 1 ms, one thread. Printed for each: what it is made of,
+//! Newton and linear iterations a step, processor seconds a step, memory of system and matrix and of the factor, and the
+//! distance of the yarns in the region from those of the full model, over the way these moved (root mean squares).
+//!
+//! `cargo bench --bench mixed`, or `make bench-mixed`; `--quick` takes smaller patches and coarser yarns.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a benchmark may panic"
+)]
+
+mod common;
+
+use common::cpu;
+use std::collections::HashMap;
+use std::f64::consts::PI;
+use std::path::PathBuf;
+use toile::body::Body;
+use toile::math::{Vec2, Vec3};
+use toile::pattern::import::garment_from_json;
+use toile::pattern::{BlendRegion, Fabric, Garment};
+use toile::sim::{ContactSettings, DrapeOptions, Settings, Sim, SimOptions};
+
+/// Steps, and what one takes [s].
+const STEPS: usize = 2;
+const DT: f64 = 1e-3;
+/// `solver.linear.kind` of every model with yarns: factors of overlapping parts, in rings under the filter. No other is faster
+/// for one of them at these sizes.
+const PARTS: f64 = 5.0;
+
+/// A garment with a plain weave of this pitch and the membrane and bending of its yarns.
+fn weave(pitch: f64, panels: &str, seams: &str) -> Garment {
+    let radius = 0.25 * pitch;
+    let (young, shear, bending, line) = (1e7, 1.6e5, 3e6, 0.15 * pitch);
+    let area = PI * radius * radius;
+    let text = format!(
+        r#"{{"toile_garment": 1, "name": "bench", "edge_length": {edge}, "panels": {panels}, "seams": {seams},
+            "fabrics": [{{"name": "y", "density": {density},
+                "membrane": {{"warp": {stretch}, "weft": {stretch}, "shear": {slant}, "coupling": 0}},
+                "bending": {{"warp": {rigidity}, "weft": {rigidity}}},
+                "yarns": {{"weave": "plain", "warp_pitch": {pitch}, "radius": {radius}, "young": {young},
+                    "shear": {shear}, "density": {line}, "bending": {yarn_bending}}}}}]}}"#,
+        edge = 12.0 * pitch,
+        density = 2.0 * line / pitch,
+        stretch = young * area / pitch,
+        slant = 4.0 * shear * radius * radius / pitch,
+        rigidity = bending * PI * radius.powi(4) / 4.0 / pitch,
+        yarn_bending = bending * radius * radius / 4.0,
+    );
+    garment_from_json(&text, None).expect("garment")
+}
+
+/// Polygons of regions, by panel.
+type Regions = Vec<(u32, Vec<Vec2>)>;
+
+/// What all models of a scene begin with.
+struct Scene {
+    garment: Garment,
+    body: Option<Body>,
+    gravity: [f64; 3],
+    /// Places of the vertices.
+    start: Vec<[f64; 3]>,
+    /// Edges whose points are held.
+    held: Vec<(u32, u32)>,
+}
+
+fn rectangle(low: Vec2, high: Vec2) -> Vec<Vec2> {
+    vec![
+        low,
+        Vec2::new(high.x, low.y),
+        high,
+        Vec2::new(low.x, high.y),
+    ]
+}
+
+impl Scene {
+    fn sim(&self, regions: &Regions, rings: u32, solver: f64) -> Sim {
+        let mut garment = self.garment.clone();
+        let list = regions.iter().map(|(panel, polygon)| BlendRegion {
+            panel: *panel,
+            polygon: polygon.clone(),
+            rings,
+        });
+        garment.blend_regions = list.collect();
+        let settings = Settings {
+            linear_kind: solver,
+            self_contact: 0.0,
+            ..Settings::default()
+        };
+        let options = SimOptions {
+            gravity: Some(self.gravity),
+            settings,
+            ..SimOptions::default()
+        };
+        let mut sim = Sim::new(&garment, &options).expect("sim");
+        if let Some(body) = &self.body {
+            sim.add_body(body, &ContactSettings::default())
+                .expect("body");
+        }
+        sim.set_positions(&self.start, None).expect("positions");
+        let active = sim.active_vertices();
+        for (panel, edge) in &self.held {
+            let along = toile::sim_scene::along(&sim, *panel, *edge).expect("edge");
+            if along.iter().all(|v| active[*v as usize]) {
+                let along = along.to_vec();
+                sim.pin(&along, None).expect("pins");
+            } else {
+                let nodes = sim.yarn_nodes_along(*panel, *edge).expect("nodes");
+                sim.pin_yarn_nodes(&nodes, None).expect("pins");
+            }
+        }
+        sim
+    }
+
+    /// Lets triangles alone come to rest: where the models begin.
+    fn drape(&mut self) {
+        let begin = cpu();
+        let mut sim = self.sim(&Vec::new(), 0, 0.0);
+        let options = DrapeOptions {
+            force_tolerance: 0.0,
+            max_steps: 0,
+        };
+        let report = sim.drape(&options, &mut |_| true).expect("drape");
+        println!(
+            "{} vertices draped as triangles before: {}, {:.1} CPU s",
+            sim.positions().len(),
+            report.outcome.name(),
+            cpu() - begin
+        );
+        self.start = sim.positions().iter().map(|p| (*p).into()).collect();
+    }
+
+    fn everywhere(&self) -> Regions {
+        let panels = 0..self.garment.panels.len() as u32;
+        panels
+            .map(|p| (p, rectangle(Vec2::new(-9.0, -9.0), Vec2::new(9.0, 9.0))))
+            .collect()
+    }
+}
+
+/// A place of a node on its panel.
+type Place = (u32, i64, i64);
+
+/// Where the nodes of yarns that are whole are.
+fn nodes(sim: &Sim) -> HashMap<Place, Vec3> {
+    let mesh = sim.yarns().expect("yarns");
+    let round = |v: f64| (v * 1e9).round() as i64;
+    (0..mesh.uv.len())
+        .filter(|n| mesh.is_whole(*n as u32))
+        .map(|n| {
+            let (panel, p) = (mesh.node_panel[n], mesh.uv[n]);
+            ((panel, round(p.x), round(p.y)), sim.yarn_nodes()[n])
+        })
+        .collect()
+}
+
+/// What a model came to.
+struct Run {
+    seconds: f64,
+    bytes: [usize; 2],
+    /// Places of nodes at the start and at the end.
+    places: [HashMap<Place, Vec3>; 2],
+}
+
+fn header() {
+    println!(
+        "model              vertices    nodes in rings unknowns  Newton  linear   CPU s  system  factor  solver"
+    );
+    println!(
+        "                                                         a step  a Newton a step      MB      MB"
+    );
+}
+
+fn run(name: &str, mut sim: Sim) -> Run {
+    let first = nodes(&sim);
+    let begin = cpu();
+    let (mut newton, mut linear, mut substeps) = (0, 0, 0);
+    for _ in 0..STEPS {
+        let report = sim.step(DT).expect("step");
+        newton += report.newton_iterations;
+        linear += report.linear_iterations;
+        substeps += report.substeps;
+    }
+    let seconds = (cpu() - begin) / STEPS as f64;
+    let info = sim.info();
+    let moving = sim.active_vertices().iter().filter(|a| **a).count();
+    println!(
+        "{name:<18} {moving:8} {:8} {:8} {:8} {:7.1} {:9.1} {seconds:7.2} {:7.0} {:7.0}  {}{}",
+        info.yarn_nodes - info.carried_nodes,
+        info.hybrid_nodes,
+        info.unknowns,
+        newton as f64 / STEPS as f64,
+        linear as f64 / newton as f64,
+        1e-6 * info.bytes as f64,
+        1e-6 * info.factor_bytes as f64,
+        info.backend,
+        if substeps as usize > STEPS {
+            format!(", {substeps} substeps")
+        } else {
+            String::new()
+        }
+    );
+    Run {
+        seconds,
+        bytes: [info.bytes, info.bytes + info.factor_bytes],
+        places: [first, nodes(&sim)],
+    }
+}
+
+/// Tells how a model compares with that of all yarns.
+fn compare(name: &str, full: &Run, mixed: &Run) {
+    let (mut apart, mut moved, mut count) = (0.0, 0.0, 0);
+    for (place, x) in &mixed.places[1] {
+        if let (Some(before), Some(after)) = (full.places[0].get(place), full.places[1].get(place))
+        {
+            apart += (x - after).norm_squared();
+            moved += (after - before).norm_squared();
+            count += 1;
+        }
+    }
+    println!(
+        "  {name}: {:.1} times as fast, {:.1} times smaller ({:.1} without the factor); {count} nodes differ by {:.1e} of their motion",
+        full.seconds / mixed.seconds,
+        full.bytes[1] as f64 / mixed.bytes[1] as f64,
+        full.bytes[0] as f64 / mixed.bytes[0] as f64,
+        f64::sqrt(apart / moved)
+    );
+}
+
+fn whole(scene: &Scene, regions: &Regions) {
+    header();
+    let direct = run("mixed, direct", scene.sim(regions, 0, PARTS));
+    let ringed = run("mixed, 1 ring", scene.sim(regions, 1, PARTS));
+    let full = run("full", scene.sim(&scene.everywhere(), 0, PARTS));
+    compare("mixed, direct", &full, &direct);
+    compare("mixed, 1 ring", &full, &ringed);
+}
+
+/// Two patches of `side` and a tenth more with yarns within `reach` of their seam.
+fn puckering(side: f64, reach: f64) {
+    let (pitch, long) = (1e-3, 1.1 * side);
+    let garment = weave(
+        pitch,
+        &format!(
+            r#"[{{"name": "short", "fabric": "y", "vertices": [[0, 0], [{side}, 0], [{side}, {side}], [0, {side}]],
+                 "edges": [[0, 1], [1, 2], [2, 3], [3, 0]]}},
+                {{"name": "long", "fabric": "y", "vertices": [[0, 0], [{side}, 0], [{side}, {long}], [0, {long}]],
+                 "placement": {{"translation": [{side}, 0, 0]}},
+                 "edges": [[0, 1], [1, 2], [2, 3], [3, 0]]}}]"#
+        ),
+        r#"[{"a": ["short", 1], "b": ["long", 3]}]"#,
+    );
+    let mut scene = Scene {
+        start: Vec::new(),
+        garment,
+        body: None,
+        gravity: [0.0; 3],
+        held: vec![(0, 3), (1, 1)],
+    };
+    let flat = Sim::new(&scene.garment, &SimOptions::default()).expect("sim");
+    let panels = flat.vertex_panels().iter();
+    let start = panels.zip(flat.vertex_uv()).map(|(panel, p)| {
+        // a slight wave shows the seam the way out of the plane
+        let (x, y) = (
+            side * f64::from(*panel) + p.x,
+            p.y * if *panel == 0 { 1.1 } else { 1.0 },
+        );
+        let near = (-(x - side).abs() / reach).exp();
+        [x, y, 1e-3 * near * (2.0 * PI * y / 0.04).sin()]
+    });
+    scene.start = start.collect();
+    println!(
+        "\npuckering: patches of {side} m and {long} m, yarns of {pitch} m within {reach} m of the seam"
+    );
+    scene.drape();
+    let tall = 2.0 * long;
+    let regions = vec![
+        (
+            0,
+            rectangle(Vec2::new(side - reach, -tall), Vec2::new(2.0 * side, tall)),
+        ),
+        (
+            1,
+            rectangle(Vec2::new(-side, -tall), Vec2::new(reach, tall)),
+        ),
+    ];
+    whole(&scene, &regions);
+}
+
+/// The pencil dress of a weave with this pitch.
+fn dress(pitch: f64) {
+    let Some(data) = std::env::var_os("TOILE_DATA").map(PathBuf::from) else {
+        println!("\nthe dress is left out: TOILE_DATA is not set");
+        return;
+    };
+    let path = data.join("garmentcode/dress_pencil_specification.json");
+    let text = std::fs::read_to_string(path).expect("pattern");
+    let mut garment = garment_from_json(&text, None).expect("garment");
+    let corner = r#"[{"name": "p", "fabric": "y", "vertices": [[0, 0], [1, 0], [0, 1]], "edges": [[0, 1], [1, 2], [2, 0]]}]"#;
+    let fabric: Vec<Fabric> = weave(pitch, corner, "[]").fabrics;
+    garment.fabrics = fabric;
+    garment.edge_length = 0.024;
+    for panel in &mut garment.panels {
+        panel.fabric = 0;
+        panel.edge_length = None;
+    }
+    let body = Body::obj(&data.join("bodies/mean_all.obj"), 1.0, 0.0).expect("body");
+    let placed = Sim::new(&garment, &SimOptions::default()).expect("sim");
+    let start = placed.positions().iter().map(|p| (*p).into());
+    let mut scene = Scene {
+        start: start.collect(),
+        garment,
+        body: Some(body),
+        gravity: [0.0, -9.81, 0.0],
+        held: Vec::new(),
+    };
+    println!("\ndress: yarns of {pitch} m on the chest");
+    scene.drape();
+    let panel = |name: &str| {
+        let found = scene.garment.panels.iter().position(|p| p.name == name);
+        found.expect("panel") as u32
+    };
+    // the two halves of the front, mirrored
+    let regions = vec![
+        (
+            panel("left_ftorso"),
+            rectangle(Vec2::new(-0.1, 0.2), Vec2::new(0.12, 0.4)),
+        ),
+        (
+            panel("right_ftorso"),
+            rectangle(Vec2::new(-0.12, 0.2), Vec2::new(0.1, 0.4)),
+        ),
+    ];
+    whole(&scene, &regions);
+}
+
+fn main() {
+    let quick = std::env::args().any(|a| a == "--quick");
+    println!("{STEPS} steps of {DT} s each, one thread");
+    if quick {
+        puckering(0.1, 0.025);
+        dress(4e-3);
+    } else {
+        puckering(0.342, 0.088);
+        dress(2.5e-3);
+    }
+}

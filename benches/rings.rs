@@ -1,0 +1,130 @@
+//! Linear solvers under the constraints of blended rings: preconditioner x ratio of triangles to yarns x step.
+//!
+//! The system of `tests/ring_cases`, with yarns that slide through all their contacts or nowhere. Iterations until all positions err
+//! by 1e-3, 1e-6 and 1e-8 against the direct solution, root mean squares. `cargo bench --bench rings`, or
+//! `make bench-mixed`; `--quick` leaves out the larger square.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a benchmark may panic"
+)]
+
+#[path = "../tests/ring_cases/mod.rs"]
+mod ring_cases;
+
+use ring_cases::{Case, case};
+use std::time::Instant;
+use toile::math::Vec3;
+use toile::math::parallel::Workers;
+use toile::solve::linear::LinearSolver;
+use toile::solve::linear::constrained::Constrained;
+use toile::solve::linear::filtered::{Beside, Filtered};
+use toile::solve::linear::pcg::ConjugateGradients;
+
+const CAP: u32 = 3000;
+const ERRORS: [f64; 3] = [1e-3, 1e-6, 1e-8];
+
+fn norm(v: &[Vec3]) -> f64 {
+    v.iter().map(Vec3::norm_squared).sum::<f64>().sqrt()
+}
+
+fn main() {
+    println!(
+        "iterations to errors of 1e-3, 1e-6, 1e-8 of all positions, seconds for the last; - beyond {CAP}"
+    );
+    let quick = std::env::args().any(|a| a == "--quick");
+    let scenes = [
+        (0.1, 5.0, [0.0285, 0.0715], false),
+        (0.1, 5.0, [0.0285, 0.0715], true),
+        (0.2, 20.0, [0.056, 0.144], false),
+        (0.2, 20.0, [0.056, 0.144], true),
+    ];
+    let count = if quick { 2 } else { scenes.len() };
+    for (side, ratio, range, sliding) in &scenes[..count] {
+        for h in [1e-4, 1e-3, 1e-2] {
+            let case = case(*side, *ratio, *range, h, *sliding);
+            let workers = Workers::new(1);
+            let n = case.matrix.n();
+            let mut expected = vec![Vec3::zeros(); n];
+            let mut direct = Constrained::new(&case.filter, &workers);
+            direct.hold(&case.fixed);
+            let start = Instant::now();
+            direct.prepare(&case.matrix).expect("factor");
+            direct
+                .solve(&case.matrix, &case.right, &mut expected, 0.0)
+                .expect("solution");
+            let first = start.elapsed().as_secs_f64();
+            let start = Instant::now();
+            direct.prepare(&case.matrix).expect("factor");
+            direct
+                .solve(&case.matrix, &case.right, &mut expected, 0.0)
+                .expect("solution");
+            println!(
+                "ratio {ratio}, step {} ms, {}: {} blocks, {} in rings, {} vertices there; direct {:.3} s, {first:.3} s with the analysis",
+                1e3 * h,
+                if *sliding {
+                    "yarns slide"
+                } else {
+                    "yarns do not slide"
+                },
+                n,
+                case.filter.nodes().len(),
+                case.filter.kept().len(),
+                start.elapsed().as_secs_f64()
+            );
+            for (smoother, second) in [
+                (Beside::Mass(case.masses.clone()), false),
+                (Beside::Blocks, false),
+                (Beside::Mass(case.masses.clone()), true),
+                (Beside::Blocks, true),
+                (Beside::Parts, true),
+            ] {
+                run(&case, smoother, second, &expected, &workers);
+            }
+        }
+    }
+}
+
+/// One row of the table.
+fn run(case: &Case, smoother: Beside, second: bool, expected: &[Vec3], workers: &Workers) {
+    let whole = norm(expected);
+    let mut name = "";
+    let mut seconds = 0.0;
+    let mut error = |limit: u32| {
+        let preconditioner = Filtered::new(&case.filter, smoother.clone(), second, workers);
+        let mut cg = ConjugateGradients::new(Box::new(preconditioner)).with_limit(limit);
+        cg.hold(&case.fixed);
+        let start = Instant::now();
+        cg.prepare(&case.matrix).expect("preconditioner");
+        let mut x = vec![Vec3::zeros(); expected.len()];
+        // ends at the limit, with what it has
+        let _ = cg.solve(&case.matrix, &case.right, &mut x, 1e-16);
+        seconds = start.elapsed().as_secs_f64();
+        name = cg.name();
+        let difference: Vec<Vec3> = x.iter().zip(expected).map(|(a, b)| a - b).collect();
+        norm(&difference) / whole
+    };
+    let (mut low, mut high) = (0, 4);
+    let mut found = Vec::new();
+    for wanted in ERRORS {
+        while high <= CAP && error(high) > wanted {
+            low = high;
+            high = (high as f64 * 1.4) as u32 + 1;
+        }
+        if high > CAP {
+            break;
+        }
+        while high - low > 1 + low / 50 {
+            let middle = low.midpoint(high);
+            if error(middle) > wanted {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        found.push(high.to_string());
+        low = high - 1;
+    }
+    found.resize(ERRORS.len(), "-".to_owned());
+    println!("  {name:<28} {:>18}  {seconds:.3} s", found.join(" / "));
+}

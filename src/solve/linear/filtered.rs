@@ -1,0 +1,156 @@
+//! Preconditioners for conjugate gradients under the constraints of blended rings, `C (v, p) = 0`.
+//!
+//! ```text
+//! z = P M^-1 P^T r + W (W^T A W)^-1 W^T r,   P = I - D^-1 C^T (C D^-1 C^T)^-1 C
+//! ```
+//!
+//! `P` leads to what the constraints admit, by moves that are small where the matrix is stiff: `D` holds its diagonal blocks
+//! ([`diagonal`]). `M` is what [`Beside`] says: `D` itself (Gould, Hribar and Nocedal 2001) or the factors of
+//! overlapping parts ([`super::schwarz`]), in which vertices and nodes know nothing of each other. At the border to the full
+//! region nodes are stiff and vertices soft, at the other border it is the other way round, and an even weight in `P`
+//! would throw the stiff ones about: with `F` in its place the iterations are six times as many.
+//!
+//! The second level, on request, is the matrix of the triangles everywhere, those under yarns too: `W` lets every node ride on
+//! its triangle, which the constraints admit.
+//!
+//! Rounding lets the residual drift out of what the constraints admit, from where the iteration diverges. So what
+//! it has along `C^T`, which does no work, is taken away in every iteration ([`Filter::restrict`]).
+
+mod diagonal;
+mod triangles;
+
+use super::LinearError;
+use super::pcg::Preconditioner;
+use super::schwarz::Schwarz;
+use crate::blend::Filter;
+use crate::math::Vec3;
+use crate::math::block::BlockMatrix;
+use crate::math::parallel::Workers;
+use diagonal::Diagonal;
+use std::sync::Arc;
+use triangles::Triangles;
+
+/// What stands for the matrix beside the triangles.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Beside {
+    /// Lumped masses over the square of the step, by point [N/m]; diagonal blocks on what is no point. On filtered residuals this
+    /// is `(S M + mu (I - S))^-1`, the paper's (Casafranca et al. 2020, equation 12) in units that agree.
+    Mass(Vec<f64>),
+    /// Diagonal blocks of the matrix.
+    Blocks,
+    /// Factors of overlapping parts of the matrix.
+    Parts,
+}
+
+/// A preconditioner that keeps the constraints.
+pub struct Filtered {
+    filter: Arc<Filter>,
+    fixed: Vec<bool>,
+    diagonal: Diagonal,
+    parts: Option<Schwarz>,
+    triangles: Option<Triangles>,
+    right: Vec<Vec3>,
+    of_mass: bool,
+}
+
+impl Filtered {
+    /// For matrices of a system with this filter, whose vertices must all have energies; `second` adds the level of the
+    /// triangles.
+    pub fn new(filter: &Arc<Filter>, beside: Beside, second: bool, workers: &Workers) -> Self {
+        let parts = beside == Beside::Parts;
+        let masses = match beside {
+            Beside::Mass(masses) => Some(masses),
+            Beside::Blocks | Beside::Parts => None,
+        };
+        Self {
+            filter: filter.clone(),
+            fixed: Vec::new(),
+            of_mass: masses.is_some(),
+            diagonal: Diagonal::new(filter, masses, workers),
+            parts: parts.then(|| Schwarz::new(workers)),
+            triangles: second.then(|| Triangles::new(filter, workers)),
+            right: Vec::new(),
+        }
+    }
+
+    fn first(&mut self, r: &[Vec3], z: &mut [Vec3]) -> Result<(), LinearError> {
+        let Some(parts) = &mut self.parts else {
+            self.diagonal.divide(r, z);
+            return self.diagonal.project(z);
+        };
+        self.right.clear();
+        self.right.extend_from_slice(r);
+        self.diagonal.restrict(&mut self.right)?;
+        for (r, fixed) in self.right.iter_mut().zip(&self.fixed) {
+            if *fixed {
+                r.fill(0.0);
+            }
+        }
+        parts.apply(&self.right, z);
+        self.diagonal.project(z)
+    }
+}
+
+impl Preconditioner for Filtered {
+    fn solver_name(&self) -> &'static str {
+        match (&self.parts, &self.triangles) {
+            (None, None) if self.of_mass => "cg_filtered_mass",
+            (None, Some(_)) if self.of_mass => "cg_filtered_mass_two_levels",
+            (None, None) => "cg_filtered_blocks",
+            (None, Some(_)) => "cg_filtered_two_levels",
+            (Some(_), None) => "cg_filtered_schwarz",
+            (Some(_), Some(_)) => "cg_filtered_schwarz_two_levels",
+        }
+    }
+
+    fn hold(&mut self, fixed: &[bool]) -> bool {
+        let changed = self.fixed != fixed;
+        if changed {
+            self.fixed.clear();
+            self.fixed.extend_from_slice(fixed);
+        }
+        changed
+    }
+
+    fn project(&mut self, r: &mut [Vec3]) {
+        self.filter.restrict(r);
+        for (r, fixed) in r.iter_mut().zip(&self.fixed) {
+            if *fixed {
+                r.fill(0.0);
+            }
+        }
+    }
+
+    fn prepare(&mut self, matrix: &BlockMatrix) -> Result<(), LinearError> {
+        // what is not known to be held moves
+        self.fixed.resize(matrix.n(), false);
+        self.diagonal.prepare(matrix, &self.fixed)?;
+        if let Some(parts) = &mut self.parts {
+            parts.prepare(matrix)?;
+        }
+        match &mut self.triangles {
+            Some(triangles) => triangles.prepare(matrix, &self.fixed),
+            None => Ok(()),
+        }
+    }
+
+    fn apply(&mut self, r: &[Vec3], z: &mut [Vec3]) {
+        let first = self.first(r, z);
+        let second = match &mut self.triangles {
+            Some(triangles) => triangles.add(r, z),
+            None => Ok(()),
+        };
+        if first.and(second).is_err() {
+            // NaN is the iteration's sign of breakdown
+            z.fill(Vec3::repeat(f64::NAN));
+        }
+    }
+
+    fn bytes(&self) -> usize {
+        self.fixed.len()
+            + size_of_val(&self.right[..])
+            + self.diagonal.bytes()
+            + self.parts.as_ref().map_or(0, Schwarz::bytes)
+            + self.triangles.as_ref().map_or(0, Triangles::bytes)
+    }
+}
