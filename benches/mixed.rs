@@ -344,7 +344,7 @@ fn main() {
     println!("{STEPS} steps of {DT} s each, one thread");
     if quick {
         puckering(0.1, 0.025);
-        dress(4e-3);
+        dress(6e-3);
     } else {
         puckering(0.342, 0.088);
         dress(2.5e-3);

@@ -467,8 +467,13 @@ fn every_form_of_a_constrained_step_has_one_solution() {
 /// is held, and their iterates keep the constraints.
 #[test]
 fn filtered_conjugate_gradients_find_the_same_step() {
-    for (edge, held) in [(0.005, 0), (0.005, 3), (0.0029, 2)] {
-        let case = case(0.03, edge, [0.0095, 0.0205], 1, false).expect("case");
+    for (edge, held, means) in [
+        (0.005, 0, false),
+        (0.005, 3, false),
+        (0.0029, 2, false),
+        (0.005, 1, true),
+    ] {
+        let case = case(0.03, edge, [0.0095, 0.0205], 1, means).expect("case");
         let filter = case.joined.coupling.filter.as_ref().expect("filter");
         let mut numbers = Numbers(31);
         let mut matrix = matrix(&case, &mut numbers);
@@ -507,7 +512,7 @@ fn filtered_conjugate_gradients_find_the_same_step() {
             let difference: Vec<Vec3> = x.iter().zip(&expected).map(|(a, b)| a - b).collect();
             let error = norm(&difference) / norm(&expected);
             println!(
-                "edges of {edge} m, {held} held, {}: {count} iterations, {error:.1e}",
+                "edges of {edge} m, means {means}, {held} held, {}: {count} iterations, {error:.1e}",
                 cg.name()
             );
             assert!(error <= 1e-8, "{}: {error:e}", cg.name());
