@@ -29,8 +29,8 @@ use toile::sim::{ContactSettings, DrapeOptions, Settings, Sim, SimOptions};
 /// Steps, and what one takes [s].
 const STEPS: usize = 2;
 const DT: f64 = 1e-3;
-/// `solver.linear.kind` of every model with yarns: factors of overlapping parts, in rings under the filter. No other is faster
-/// for one of them at these sizes.
+/// `solver.linear.kind` of every model with yarns: factors of overlapping parts, whose work grows with the nodes and no faster; in
+/// rings under the filter.
 const PARTS: f64 = 5.0;
 
 /// A garment with a plain weave of this pitch and the membrane and bending of its yarns.
