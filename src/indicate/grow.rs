@@ -1,21 +1,21 @@
 //! From errors at vertices to a region: where they are above a tolerance, rounded.
 //!
-//! With the smoothed error `e_v`, a root mean square over a vertex and its neighbours, sewn ones included, taken twice, the region of
+//! With the smoothed error `e_v`, a root mean square over a vertex and its neighbours, sewn ones included, taken four times, the region of
 //! a tolerance is
 //!
 //! ```text
-//! S0 = {v : e_v > tolerance},   S1 = close(grow(S0)),   full = triangles with three corners in S1
+//! S0 = {v : e_v > tolerance},   S1 = close(cross(S0)),   full = triangles with three corners in S1
 //! ```
 //!
-//! `grow` adds the neighbours: the border of a region has to lie where triangles are good enough. `close` adds what lies between two parts
-//! that are two edges apart. Then pieces of fewer than [`LEAST_PIECE`] triangles are left out, and holes of fewer than [`LARGEST_HOLE`]
+//! Smoothing moves the border to where triangles are good enough. `cross` adds the other sides of seams with their neighbours, since a seam is
+//! wholly yarns or wholly triangles; `close` what lies between two parts that are two edges apart. Then pieces of fewer than [`LEAST_PIECE`] triangles are left out, and holes of fewer than [`LARGEST_HOLE`]
 //! filled, and triangles whose corners are all those of others are added. Every step keeps subsets subsets, so that the region of a smaller tolerance holds that of a larger one.
 
 use crate::math::topology;
 use crate::tri::GarmentMesh;
 
 /// Passes of smoothing.
-const PASSES: usize = 2;
+const PASSES: usize = 4;
 /// Least number of triangles of a piece.
 const LEAST_PIECE: usize = 6;
 /// Number of triangles from which a hole stays.
@@ -26,6 +26,8 @@ pub struct Growth<'a> {
     mesh: &'a GarmentMesh,
     /// Vertices at each vertex, those sewn to it included.
     near: Vec<Vec<u32>>,
+    /// Pairs of sewn vertices.
+    sewn: Vec<[u32; 2]>,
     /// Triangles that share an edge, or a seam's.
     beside: Vec<Vec<u32>>,
     /// Smoothed error of each vertex.
@@ -45,8 +47,12 @@ impl<'a> Growth<'a> {
         for [a, b] in topology::edges(&mesh.triangles) {
             join(a, b);
         }
-        for link in mesh.seams.iter().flat_map(|s| &s.links) {
-            join(link.vertex, link.edge[usize::from(link.t > 0.5)]);
+        let links = mesh.seams.iter().flat_map(|s| &s.links);
+        let sewn: Vec<[u32; 2]> = links
+            .map(|l| [l.vertex, l.edge[usize::from(l.t > 0.5)]])
+            .collect();
+        for [a, b] in &sewn {
+            join(*a, *b);
         }
         for list in &mut near {
             list.sort_unstable();
@@ -61,7 +67,8 @@ impl<'a> Growth<'a> {
             error = (0..error.len()).map(mean).collect();
         }
         Self {
-            beside: neighbours(mesh),
+            beside: neighbours(mesh, &sewn),
+            sewn,
             mesh,
             near,
             error,
@@ -77,8 +84,8 @@ impl<'a> Growth<'a> {
     /// The triangles of a tolerance's region.
     pub fn full(&self, tolerance: f64) -> Vec<bool> {
         let above: Vec<bool> = self.error.iter().map(|e| *e > tolerance).collect();
-        let grown = self.dilated(&above);
-        let closed = self.eroded(&self.dilated(&grown));
+        let both = self.crossed(above);
+        let closed = self.eroded(&self.dilated(&both));
         let corners = |t: usize| self.mesh.triangles[t].iter().all(|v| closed[*v as usize]);
         let mut full: Vec<bool> = (0..self.may.len())
             .map(|t| self.may[t] && corners(t))
@@ -109,6 +116,22 @@ impl<'a> Growth<'a> {
         }
     }
 
+    /// Adds the other sides of seams, with their neighbours.
+    fn crossed(&self, mut set: Vec<bool>) -> Vec<bool> {
+        let over: Vec<u32> = (self.sewn.iter())
+            .flat_map(|&[a, b]| [[a, b], [b, a]])
+            .filter(|[from, _]| set[*from as usize])
+            .map(|[_, to]| to)
+            .collect();
+        for v in over {
+            set[v as usize] = true;
+            for w in &self.near[v as usize] {
+                set[*w as usize] = true;
+            }
+        }
+        set
+    }
+
     fn dilated(&self, set: &[bool]) -> Vec<bool> {
         let any = |v: usize| set[v] || self.near[v].iter().any(|w| set[*w as usize]);
         (0..set.len()).map(any).collect()
@@ -121,7 +144,7 @@ impl<'a> Growth<'a> {
 }
 
 /// Triangles beside each triangle: across an edge, or with a vertex that is sewn to one of its own.
-fn neighbours(mesh: &GarmentMesh) -> Vec<Vec<u32>> {
+fn neighbours(mesh: &GarmentMesh, sewn: &[[u32; 2]]) -> Vec<Vec<u32>> {
     let mut beside = vec![Vec::new(); mesh.triangles.len()];
     for (_, [a, b]) in topology::inner_edges(&mesh.triangles) {
         beside[a as usize].push(b);
@@ -131,10 +154,9 @@ fn neighbours(mesh: &GarmentMesh) -> Vec<Vec<u32>> {
     for (t, tri) in (0..).zip(&mesh.triangles) {
         tri.iter().for_each(|v| at[*v as usize].push(t));
     }
-    for link in mesh.seams.iter().flat_map(|s| &s.links) {
-        let other = link.edge[usize::from(link.t > 0.5)];
-        for a in &at[link.vertex as usize] {
-            for b in &at[other as usize] {
+    for [one, other] in sewn {
+        for a in &at[*one as usize] {
+            for b in &at[*other as usize] {
                 beside[*a as usize].push(*b);
                 beside[*b as usize].push(*a);
             }

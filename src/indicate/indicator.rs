@@ -12,6 +12,7 @@
 //! | curvature | `(k h)^2/24 + max(0, k d - 0.15)` with the largest principal curvature `k` of `q` |
 //! | strain | beyond the range of the fit, and `3/2 E^2` of a stretched membrane without ridges |
 //! | stress | `|E - E*|`, `E*` the mean of the triangles at the corners |
+//! | seam | `atan(0.15 |k_n| min(sqrt(D_n/N), L/2))` at sewn vertices, with the curvature `k_n` of `q` across the seam |
 //!
 //! * **wrinkle**: a strip as long as an edge, held at its ends by the vertices, buckles at Euler's load `D pi^2/h^2` (Timoshenko and Gere
 //!   1961, section 2.1; `e_cr = D pi^2/(C h^2)`), into a half wave `A sin(pi s/h)` which the triangles cannot have. It takes
@@ -23,14 +24,16 @@
 //! * **strain**: yarns are linear in their length, Saint Venant-Kirchhoff membranes in Green strain: tensions differ by `3/2 E` of their
 //!   size. Beyond the tests a material says nothing, and the strain that is beyond counts whole.
 //! * **stress**: strain is constant in a triangle and jumps to the next, as far as it is not resolved (Zienkiewicz and Zhu 1987).
-//!
-//! Near seams, which are springs between triangles and rods between yarns and force wrinkles on the cloth beside them, errors weigh more:
+//! * **seam**: the seam of triangles bears a moment `D_n k_n`, that of yarns, a rod to which their ends are tied, none. Where it is let go the
+//!   slope changes by `k_n` times the length over which the moment fades: `sqrt(D_n/N)` under a tension `N` across the seam (the boundary
+//!   layer of a stretched plate), at most half the panel's width, `L` the root of its area. That is a strip free to turn; what else holds a
+//!   panel leaves some 0.15 of it, a figure chosen on the comparisons of `docs/mixed.md`.
 //!
 //! ```text
-//! error = (1 + exp(-r/2)) sqrt(wrinkle^2 + mesh^2 + curvature^2 + strain^2 + stress^2)
+//! error = sqrt(wrinkle^2 + mesh^2 + curvature^2 + strain^2 + stress^2 + seam^2)
 //! ```
 //!
-//! with the number `r` of edges to the nearest sewn vertex. Values of triangles are those of vertices by means of squares over the
+//! Values of triangles are those of vertices by means of squares over the
 //! area. A panel with fewer than eight vertices has no surface fitted, and a fabric without yarns no error.
 
 use crate::cloth::Cloth;
@@ -38,16 +41,16 @@ use crate::error::Result;
 use crate::fabric::fit::Range;
 use crate::math::{Mat2, Vec2, Vec3, topology};
 use crate::pattern::{Fabric, Garment};
-use crate::system::membrane::Membrane;
+use crate::system::membrane::{Membrane, material_rotation};
 use crate::tri::GarmentMesh;
 use nalgebra::{Cholesky, SMatrix, SVector};
 use std::f64::consts::PI;
 
 /// Names of the criteria, in the order of [`Indicator::criteria`].
-pub const CRITERIA: [&str; 5] = ["wrinkle", "mesh", "curvature", "strain", "stress"];
+pub const CRITERIA: [&str; 6] = ["wrinkle", "mesh", "curvature", "strain", "stress", "seam"];
 
-/// Edges over which a seam's weight falls by `e`.
-const SEAM_REACH: f64 = 2.0;
+/// Part of the slope of a free strip that a seam's panels take when its moment is let go.
+const FREED: f64 = 0.15;
 /// Coefficients of a quadratic surface.
 const UNKNOWNS: usize = 6;
 /// Least number of points that one is fitted to.
@@ -57,9 +60,7 @@ const POINTS: usize = 8;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Indicator {
     /// Estimate by each of [`CRITERIA`] at each vertex.
-    pub criteria: Vec<[f64; 5]>,
-    /// Weight by the distance to seams, 1 to 2.
-    pub seam: Vec<f64>,
+    pub criteria: Vec<[f64; CRITERIA.len()]>,
     /// All together.
     pub error: Vec<f64>,
     /// Flat area of each triangle [m^2].
@@ -74,46 +75,54 @@ impl Indicator {
         let ranges: Vec<Option<Range>> = (garment.fabrics.iter())
             .map(|f| f.yarns.as_ref().map(Range::of))
             .collect();
-        let triangles = triangles(&cloth, &ranges, positions);
-        let mut criteria = vec![[0.0; 5]; mesh.uv.len()];
+        let membrane = Membrane::new(&cloth, 1.0);
+        let triangles = triangles(&cloth, &membrane, &ranges, positions);
+        let mut criteria = vec![[0.0; CRITERIA.len()]; mesh.uv.len()];
         let mut around = vec![0.0; mesh.uv.len()];
+        let mut stresses = vec![Vec3::zeros(); mesh.uv.len()];
         for (t, tri) in mesh.triangles.iter().enumerate() {
+            let (area, stress) = (cloth.areas[t], membrane.stress(t, positions));
             for v in tri.map(|v| v as usize) {
-                around[v] += cloth.areas[t];
+                around[v] += area;
+                stresses[v] += stress * area;
                 for (sum, value) in [(0, 0), (3, 1), (4, 2)] {
-                    criteria[v][sum] += triangles[t][value].powi(2) * cloth.areas[t];
+                    criteria[v][sum] += triangles[t][value].powi(2) * area;
                 }
             }
         }
+        let across = across_seams(mesh);
+        let widths = widths(&cloth);
         for (v, values) in criteria.iter_mut().enumerate() {
-            let fabric = &garment.fabrics[cloth.panel_fabric[mesh.vertex_panel[v] as usize]];
+            let panel = mesh.vertex_panel[v] as usize;
+            let fabric = &garment.fabrics[cloth.panel_fabric[panel]];
             let Some(yarns) = &fabric.yarns else {
-                *values = [0.0; 5];
+                *values = [0.0; CRITERIA.len()];
                 continue;
             };
+            let area = around[v].max(f64::MIN_POSITIVE);
             for k in [0, 3, 4] {
-                values[k] = (values[k] / around[v].max(f64::MIN_POSITIVE)).sqrt();
+                values[k] = (values[k] / area).sqrt();
             }
-            if let Some(surface) = near.surface(mesh, positions, v) {
-                let [a, b] = yarns.structure.pitch();
-                let tested = Range::of(yarns).curvature * a.max(b);
-                let k = surface.curvature;
-                values[1] = surface.rest;
-                values[2] = (k * surface.edge).powi(2) / 24.0 + (k * a.max(b) - tested).max(0.0);
+            let Some(surface) = near.surface(mesh, positions, v) else {
+                continue;
+            };
+            let [a, b] = yarns.structure.pitch();
+            let tested = Range::of(yarns).curvature * a.max(b);
+            let k = surface.curvature.symmetric_eigenvalues().amax();
+            values[1] = surface.rest;
+            values[2] = (k * surface.edge).powi(2) / 24.0 + (k * a.max(b) - tested).max(0.0);
+            if let Some(n) = across[v].try_normalize(1e-12) {
+                let m = material_rotation(cloth.panel_grain[panel]) * n;
+                let tension = m.dot(&(tensor(&stresses[v]) * m)) / area;
+                let fades = (rigidity(fabric, &m) / tension.max(f64::MIN_POSITIVE)).sqrt();
+                let k = n.dot(&(surface.curvature * n)).abs();
+                values[5] = (FREED * k * fades.min(0.5 * widths[panel])).atan();
             }
         }
-        let seam: Vec<f64> = (near.to_seams(mesh).into_iter())
-            .map(|r| 1.0 + r.map_or(0.0, |r| (-f64::from(r) / SEAM_REACH).exp()))
-            .collect();
-        let norm = |c: &[f64; 5]| c.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let norm = |c: &[f64; CRITERIA.len()]| c.iter().map(|x| x * x).sum::<f64>().sqrt();
         Ok(Self {
-            error: criteria
-                .iter()
-                .zip(&seam)
-                .map(|(c, s)| s * norm(c))
-                .collect(),
+            error: criteria.iter().map(norm).collect(),
             criteria,
-            seam,
             areas: cloth.areas,
         })
     }
@@ -129,9 +138,13 @@ impl Indicator {
 }
 
 /// Wrinkle, strain and stress of each triangle.
-fn triangles(cloth: &Cloth, ranges: &[Option<Range>], x: &[Vec3]) -> Vec<[f64; 3]> {
+fn triangles(
+    cloth: &Cloth,
+    membrane: &Membrane,
+    ranges: &[Option<Range>],
+    x: &[Vec3],
+) -> Vec<[f64; 3]> {
     let mesh = &cloth.mesh;
-    let membrane = Membrane::new(cloth, 1.0);
     let strains: Vec<Vec3> = (0..mesh.triangles.len())
         .map(|t| membrane.strain(t, x))
         .collect();
@@ -174,15 +187,56 @@ fn size(e: &Vec3) -> f64 {
     (e.x * e.x + e.y * e.y + 0.5 * e.z * e.z).sqrt()
 }
 
+/// A stress `(11, 22, 12)`.
+fn tensor(s: &Vec3) -> Mat2 {
+    Mat2::new(s.x, s.z, s.z, s.y)
+}
+
+/// Rigidity of a bend that curves the direction `n`, in the frame of the yarns.
+fn rigidity(fabric: &Fabric, n: &Vec2) -> f64 {
+    fabric.bending_weft * n.x * n.x + fabric.bending_warp * n.y * n.y
+}
+
+/// Root of the area of each panel [m].
+fn widths(cloth: &Cloth) -> Vec<f64> {
+    let mut areas = vec![0.0; cloth.panel_fabric.len()];
+    for (panel, area) in cloth.mesh.triangle_panel.iter().zip(&cloth.areas) {
+        areas[*panel as usize] += area;
+    }
+    areas.into_iter().map(f64::sqrt).collect()
+}
+
+/// Direction across the seam at each sewn vertex, zero at the others.
+fn across_seams(mesh: &GarmentMesh) -> Vec<Vec2> {
+    let sewn = mesh.sewn();
+    let mut across = vec![Vec2::zeros(); mesh.uv.len()];
+    for side in topology::boundary_edges(&mesh.triangles) {
+        let [a, b] = side.map(|v| v as usize);
+        if sewn[a] && sewn[b] {
+            let along = mesh.uv[b] - mesh.uv[a];
+            let normal = Vec2::new(-along.y, along.x);
+            for v in [a, b] {
+                // a direction has no sign
+                let sign = if across[v].dot(&normal) < 0.0 {
+                    -1.0
+                } else {
+                    1.0
+                };
+                across[v] += normal * sign;
+            }
+        }
+    }
+    across
+}
+
 /// Slope of the half wave that a pressed triangle would have between its vertices.
 fn hidden_slope(fabric: &Fabric, strain: &Vec3, stress: &Vec3, edge: f64) -> f64 {
     let eigen = Mat2::new(strain.x, 0.5 * strain.z, 0.5 * strain.z, strain.y).symmetric_eigen();
     let k = eigen.eigenvalues.imin();
     let pressed = -eigen.eigenvalues[k];
     let n: Vec2 = eigen.eigenvectors.column(k).into_owned();
-    let pressure = -n.dot(&(Mat2::new(stress.x, stress.z, stress.z, stress.y) * n));
-    let rigidity = fabric.bending_weft * n.x * n.x + fabric.bending_warp * n.y * n.y;
-    let critical = rigidity * (PI / edge).powi(2);
+    let pressure = -n.dot(&(tensor(stress) * n));
+    let critical = rigidity(fabric, &n) * (PI / edge).powi(2);
     if pressed > 0.0 && pressure > critical {
         (2.0 * pressed * (1.0 - critical / pressure)).sqrt()
     } else {
@@ -213,8 +267,8 @@ fn beyond(fabric: &Fabric, range: &Range, strain: &Vec3) -> f64 {
 struct Surface {
     /// Root mean square of the distances from it, over the edge.
     rest: f64,
-    /// Largest principal curvature in size [1/m].
-    curvature: f64,
+    /// Curvature in flat coordinates [1/m].
+    curvature: Mat2,
     /// Mean length of the edges at the vertex [m].
     edge: f64,
 }
@@ -296,38 +350,10 @@ impl Neighbours {
         let derivative = |k: usize| fit.row(k).transpose();
         let normal = derivative(1).cross(&derivative(2)).try_normalize(1e-300)?;
         let second = |k: usize| derivative(k).dot(&normal) / (edge * edge);
-        let curvatures =
-            Mat2::new(second(3), second(4), second(4), second(5)).symmetric_eigenvalues();
         Some(Surface {
             rest: (rest / (points.len() - UNKNOWNS) as f64).sqrt() / edge,
-            curvature: curvatures.amax(),
+            curvature: Mat2::new(second(3), second(4), second(4), second(5)),
             edge,
         })
-    }
-
-    /// Number of edges from each vertex to the nearest sewn one of its panel, if there is one.
-    fn to_seams(&self, mesh: &GarmentMesh) -> Vec<Option<u32>> {
-        let mut rings = vec![None; mesh.uv.len()];
-        let links = mesh.seams.iter().flat_map(|s| &s.links);
-        let mut front: Vec<u32> = links
-            .flat_map(|l| [l.vertex, l.edge[0], l.edge[1]])
-            .collect();
-        let mut ring = 0;
-        while !front.is_empty() {
-            front.retain(|v| rings[*v as usize].replace(ring).is_none_or(|r| r > ring));
-            let mut next: Vec<u32> = Vec::new();
-            for v in &front {
-                next.extend(
-                    self.of(*v as usize)
-                        .iter()
-                        .filter(|w| rings[**w as usize].is_none()),
-                );
-            }
-            next.sort_unstable();
-            next.dedup();
-            front = next;
-            ring += 1;
-        }
-        rings
     }
 }
