@@ -696,6 +696,94 @@ typedef struct toile_yarn_changes {
 } toile_yarn_changes;
 
 /**
+ * Which region of yarns is wanted: at least one of tolerance and budget.
+ */
+typedef struct toile_suggest_desc {
+    /**
+     * sizeof(toile_suggest_desc).
+     */
+    size_t struct_size;
+    /**
+     * Largest error of the deformation's gradient that is left to triangles, from 0.001; 0 (default) is none given.
+     */
+    double tolerance;
+    /**
+     * Most nodes of yarns; 0 (default) is no limit.
+     */
+    uint64_t budget;
+    /**
+     * Hybrid rings around the region, 0 (default) to 3.
+     */
+    uint32_t rings;
+    /**
+     * 0.
+     */
+    uint32_t reserved;
+} toile_suggest_desc;
+
+/**
+ * What a suggested region leaves and costs, as predicted before it is built.
+ */
+typedef struct toile_suggestion {
+    /**
+     * sizeof(toile_suggestion), set by the caller.
+     */
+    size_t struct_size;
+    /**
+     * Tolerance that the region is one for: the wanted one, or what the budget allows.
+     */
+    double tolerance;
+    /**
+     * Error of triangles alone, root mean square over the area.
+     */
+    double error;
+    /**
+     * Same of the triangles that are left.
+     */
+    double error_left;
+    /**
+     * Largest error of a triangle that is left.
+     */
+    double largest_left;
+    /**
+     * Triangles that give way to yarns; 0 where no yarns are needed.
+     */
+    uint64_t full_triangles;
+    /**
+     * Nodes of yarns, those that triangles carry included.
+     */
+    uint64_t yarn_nodes;
+    /**
+     * Nodes that triangles carry.
+     */
+    uint64_t carried_nodes;
+    /**
+     * Triangles that are simulated.
+     */
+    uint64_t active_triangles;
+    /**
+     * Scalar unknowns.
+     */
+    uint64_t unknowns;
+    /**
+     * Memory of the simulation [bytes].
+     */
+    uint64_t bytes;
+    /**
+     * Time of a drape over that of triangles alone.
+     */
+    double time_ratio;
+    /**
+     * Nodes of yarns wherever fabrics have them, for comparison.
+     */
+    uint64_t all_yarn_nodes;
+    /**
+     * Time of a drape with yarns wherever fabrics have them over that of triangles alone.
+     */
+    double all_time_ratio;
+} toile_suggestion;
+
+/**
  * Numbers that lie in the library's memory. Valid until the next call on the same handle whose
  * handle is not const; compare `epoch` with toile_sim_epoch to find out.
  */
@@ -806,6 +894,16 @@ toile_status toile_system_info_init(struct toile_system_info *out, size_t struct
 toile_status toile_yarn_changes_init(struct toile_yarn_changes *out, size_t struct_size);
 
 /**
+ * Fills a description of a wanted region of `struct_size` bytes with defaults and its own size.
+ */
+toile_status toile_suggest_desc_init(struct toile_suggest_desc *desc, size_t struct_size);
+
+/**
+ * Fills a suggestion of `struct_size` bytes with zeros and its own size.
+ */
+toile_status toile_suggestion_init(struct toile_suggestion *out, size_t struct_size);
+
+/**
  * Fills a view of `struct_size` bytes with zeros and its own size.
  */
 toile_status toile_view_f64_init(struct toile_view_f64 *out, size_t struct_size);
@@ -877,6 +975,18 @@ toile_status toile_garment_set_blend_region(struct toile_garment *garment,
                                             const double *uv,
                                             size_t count,
                                             uint32_t rings);
+
+/**
+ * Asks for every yarn in the triangles whose three corners have an `alpha` of 1, with `rings` hybrid rings around them: one number from
+ * 0 to 1 for each vertex of the garment's simulation, shape [count], as toile_sim_suggest_region gives them. Values below 1 are
+ * those of the rings. Takes the place of all earlier regions; 0 everywhere takes them away. The garment must not have
+ * changed since in panels, seams or edge lengths. TOILE_E_ARGUMENT: another number of vertices, a value outside of 0 to 1, or
+ * no triangle has three corners with 1.
+ */
+toile_status toile_garment_set_blend_vertices(struct toile_garment *garment,
+                                              const double *alpha,
+                                              size_t count,
+                                              uint32_t rings);
 
 /**
  * Takes every blend region away.
@@ -1443,6 +1553,30 @@ toile_status toile_sim_pin_yarn_nodes(struct toile_sim *sim,
  * Lets nodes of yarns go. TOILE_E_ARGUMENT names one that is not held.
  */
 toile_status toile_sim_unpin_yarn_nodes(struct toile_sim *sim, const uint32_t *nodes, size_t count);
+
+/**
+ * Suggests the region in which yarns would change the answer, from the present state of triangles alone, for a
+ * tolerance, a budget of nodes, or both: `alpha` of each vertex, shape [vertex_count], 1 where yarns are wanted, falling to 0 over
+ * the rings, 0 elsewhere; all 0 where triangles do. toile_garment_set_blend_vertices takes it. `out`, which may be NULL, gets what
+ * the region leaves and costs. Sizes as in toile_sim_positions; `alpha` NULL asks for the number and for `out`.
+ * TOILE_E_ARGUMENT: neither tolerance nor budget, or no fabric has yarns; TOILE_E_UNSUPPORTED: the
+ * simulation has yarns already.
+ */
+toile_status toile_sim_suggest_region(const struct toile_sim *sim,
+                                      const struct toile_suggest_desc *desc,
+                                      double *alpha,
+                                      size_t capacity,
+                                      size_t *needed,
+                                      struct toile_suggestion *out);
+
+/**
+ * Estimated error of the triangles at each vertex, shape [vertex_count], in the present state: that of the deformation's gradient,
+ * without a unit; 0 where the fabric has no yarns. Sizes as in toile_sim_positions. TOILE_E_UNSUPPORTED: the simulation has yarns.
+ */
+toile_status toile_sim_vertex_errors(const struct toile_sim *sim,
+                                     double *out,
+                                     size_t capacity,
+                                     size_t *needed);
 
 /**
  * Positions of the vertices [m] as they are now, shape [vertex_count, 3], kept as they are until

@@ -10,6 +10,7 @@ pub mod cloth;
 pub mod error;
 pub mod fabric;
 pub mod fmi;
+pub mod indicate;
 pub mod math;
 pub mod pattern;
 pub mod readout;

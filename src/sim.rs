@@ -6,6 +6,7 @@
 mod pins;
 mod read;
 mod run;
+mod suggest;
 mod world;
 mod yarns;
 

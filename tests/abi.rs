@@ -212,6 +212,8 @@ fn both_sides_see_the_same_sizes() {
         toile_energies,
         toile_system_info,
         toile_yarn_changes,
+        toile_suggest_desc,
+        toile_suggestion,
         toile_view_f64
     );
     assert_eq!(

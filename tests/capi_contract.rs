@@ -25,6 +25,8 @@ fn with_sim(sim: *mut toile_sim) -> Vec<(&'static str, toile_status)> {
     let mut energies = filled(toile_energies_init);
     let mut info = filled(toile_system_info_init);
     let mut changes = filled(toile_yarn_changes_init);
+    let mut wish = filled(toile_suggest_desc_init);
+    wish.tolerance = 0.1;
     let sphere = sphere(0.1);
     let garment = &mut ptr::null_mut();
     let zero = [0.0; 12];
@@ -72,6 +74,8 @@ fn with_sim(sim: *mut toile_sim) -> Vec<(&'static str, toile_status)> {
         toile_sim_yarn_active(ptr::null_mut(), 0, n),
         toile_sim_yarn_forces(ptr::null_mut(), 0, n),
         toile_sim_yarn_changes(&mut changes),
+        toile_sim_suggest_region(&wish, ptr::null_mut(), 0, n, ptr::null_mut()),
+        toile_sim_vertex_errors(ptr::null_mut(), 0, n),
         toile_sim_locate_yarn_node(0, zero.as_ptr(), &mut count),
         toile_sim_yarn_end(0, 0, &mut count),
         toile_sim_body_positions(0, ptr::null_mut(), 0, n),
@@ -110,6 +114,7 @@ fn with_garment(garment: *mut toile_garment) -> Vec<(&'static str, toile_status)
         toile_garment_add_fabric(json.as_ptr(), 2, &mut index),
         toile_garment_set_panel_fabric(0, 0),
         toile_garment_set_blend_region(0, corners.as_ptr(), 3, 1),
+        toile_garment_set_blend_vertices(corners.as_ptr(), 3, 0),
         toile_garment_clear_blend_region(),
         toile_garment_check(),
         toile_garment_panel_count(&mut index),

@@ -629,3 +629,46 @@ fn a_fabric_gets_the_material_of_its_yarns() {
     assert_eq!(code(&output), 1);
     assert!(text(&output.stderr).contains("no yarns"));
 }
+
+/// The written garment is the scene's with the suggested region, and the scene reads it.
+#[test]
+fn a_region_is_suggested_drawn_and_written_as_a_garment() {
+    let folder = Folder::new("suggest");
+    let pucker = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/pucker.json");
+    let out = path(&folder.0).to_owned();
+    let base = ["suggest", path(&pucker), "--out", &out];
+    let output = toile(&[&base[..], &["--budget", "900", "--picture-size", "120x60"]].concat());
+    let said = text(&output.stdout);
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    for word in ["wrinkle", "seam", "tolerance", "suggested", "yarn nodes"] {
+        assert!(said.contains(word), "{said}");
+    }
+    assert!(folder.0.join("picture.png").is_file());
+    let read = |name: &str| -> Value {
+        serde_json::from_str(&std::fs::read_to_string(folder.0.join(name)).unwrap()).unwrap()
+    };
+    let region = read("region.json");
+    assert_eq!(
+        region["blend_regions"],
+        read("garment.json")["blend_regions"]
+    );
+    let alpha = region["alpha"].as_array().unwrap();
+    assert!(
+        alpha.contains(&json!(1.0)) && alpha.len() == region["error"].as_array().unwrap().len()
+    );
+    let mut scene: Value =
+        serde_json::from_str(&std::fs::read_to_string(&pucker).unwrap()).unwrap();
+    scene["garment"] = json!({"file": "garment.json"});
+    let mixed = folder.write("scene.json", &scene.to_string());
+    let info = text(&toile(&["info", path(&mixed)]).stdout);
+    assert!(info.contains("carried nodes"), "{info}");
+    // neither tolerance nor budget, and one that is none
+    assert_eq!(code(&toile(&base)), 2);
+    let refused = toile(&[&base[..], &["--tolerance", "0"]].concat());
+    assert_eq!(code(&refused), 1);
+    assert!(
+        text(&refused.stderr).contains("from 0.001"),
+        "{}",
+        text(&refused.stderr)
+    );
+}

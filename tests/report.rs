@@ -1,7 +1,7 @@
 //! Reports of speed against error: what is compared, and what is not.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may panic")]
 
-use toile::report::{Kind, Report, run};
+use toile::report::{Kind, Report, rivals, run};
 use toile::scene::Scene;
 use toile::sim::Outcome;
 
@@ -135,4 +135,22 @@ fn scenes_with_nothing_to_compare_are_refused() {
     moving.run.drape = false;
     let error = run(&moving, &mut |_| ()).unwrap_err();
     assert!(error.message.contains("drapes"), "{error}");
+}
+
+/// Where a seam puckers, yarns in a suggested region err less than in the strips that the example has, with no more nodes.
+#[test]
+fn a_suggested_region_beats_a_drawn_one_of_the_same_cost() {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/pucker.json");
+    let report = rivals(&Scene::from_file(&path).expect("scene"), &mut |_| ()).expect("report");
+    let [triangles, drawn, suggested, yarns] = &report.rows[..] else {
+        panic!("{} models", report.rows.len());
+    };
+    let error = |row: &toile::report::Row| row.deviation.unwrap().error;
+    println!("{} {} {}", error(triangles), error(drawn), error(suggested));
+    assert!(suggested.yarn_nodes <= drawn.yarn_nodes && yarns.reference);
+    assert!(error(suggested) < error(drawn));
+    assert!(error(suggested) < 0.2 * error(triangles));
+    let bare = scene(1, "");
+    let refused = rivals(&bare, &mut |_| ()).unwrap_err();
+    assert!(refused.message.contains("it has none"), "{refused}");
 }

@@ -46,6 +46,8 @@ mod capi_random_calls;
 mod capi_refusals;
 #[path = "capi_results.rs"]
 mod capi_results;
+#[path = "capi_suggest.rs"]
+mod capi_suggest;
 #[path = "capi_threads.rs"]
 mod capi_threads;
 #[path = "cli_toile.rs"]
@@ -116,6 +118,8 @@ mod self_contact_sheets;
 mod self_contact_term;
 #[path = "snapshots.rs"]
 mod snapshots;
+#[path = "suggest.rs"]
+mod suggest;
 #[path = "terms_fd.rs"]
 mod terms_fd;
 #[path = "terms_physics.rs"]

@@ -15,7 +15,7 @@ import pytest
 
 import toile
 from square import SQUARE, square
-from weave import pull, weave
+from weave import WEAVE, pull, weave
 
 def test_arrays_have_the_shapes_and_values_that_were_asked_for():
     with toile.Sim(square()) as sim:
@@ -319,3 +319,23 @@ def test_handles_are_not_copied_and_numbers_do_not_wrap():
         assert sim.time == 0
     with pytest.raises(ValueError, match="threads: -1"):
         toile.Sim(square(0.1), threads=-1)
+
+
+def test_a_suggested_region_goes_into_the_garment():
+    garment = toile.Garment.from_json(json.dumps({**WEAVE, "blend_regions": []}))
+    with toile.Sim(garment, gravity=(0, 0, 0)) as sim:
+        positions = sim.positions.copy()
+        alpha, nothing = sim.suggest_region(tolerance=0.01)
+        assert not alpha.any() and nothing.full_triangles == 0
+        positions[:, 2] += 4e-4 * np.sin(3e3 * positions[:, 0])
+        sim.set_positions(positions)
+        alpha, found = sim.suggest_region(tolerance=0.01, budget=100)
+        assert alpha.shape == (len(positions),) and set(alpha) <= {0.0, 1.0}
+        assert 0 < found.yarn_nodes <= 100 and sim.vertex_errors.max() > 0.01
+        with pytest.raises(toile.UsageError, match="tolerance or a budget"):
+            sim.suggest_region()
+        with pytest.raises(ValueError):
+            sim.suggest_region(budget=-1)
+    garment.set_blend_vertices(alpha)
+    with toile.Sim(garment) as sim:
+        assert sim.info.active_triangles == found.active_triangles

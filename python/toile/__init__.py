@@ -10,7 +10,7 @@ from ._body import Body
 from ._errors import DataError, NumericsError, ToileError, UsageError
 from ._ffi import lib
 from ._garment import Edge, Garment
-from ._report import Energies, Outcome, Report, SystemInfo, YarnChanges
+from ._report import Energies, Outcome, Report, Suggestion, SystemInfo, YarnChanges
 from ._sim import Sim
 
 __all__ = [
@@ -23,6 +23,7 @@ __all__ = [
     "Outcome",
     "Report",
     "Sim",
+    "Suggestion",
     "SystemInfo",
     "ToileError",
     "UsageError",

@@ -10,7 +10,7 @@ from typing import Any, Optional, Sequence, Union
 import numpy as np
 
 from . import _ffi
-from ._arrays import Array, PathLike, _dir, _encode, _f64, _pointer, _text, _u32, _vector
+from ._arrays import Array, PathLike, _dir, _encode, _f64, _pointer, _real, _text, _u32, _vector
 from ._errors import _check
 from ._ffi import lib
 from ._owner import _Owner
@@ -172,6 +172,19 @@ class Garment(_Owner):
         uv = _f64(polygon, 2, "polygon")
         _check(
             lib.toile_garment_set_blend_region(self.handle, panel, _pointer(uv), len(uv), rings)
+        )
+
+    def set_blend_vertices(self, alpha: Array, rings: int = 0) -> None:
+        """Asks for every yarn in the triangles whose corners all have an `alpha` of 1, one number for each
+        vertex of the garment's simulation, shape (vertices,), with `rings` hybrid rings around them, as
+        :meth:`Sim.suggest_region` gives them. Takes the place of all earlier regions."""
+        values = _real(alpha, "alpha")
+        if values.ndim != 1:
+            raise ValueError(f"alpha: shape {values.shape}, expected (vertices,)")
+        _check(
+            lib.toile_garment_set_blend_vertices(
+                self.handle, _pointer(values), len(values), rings
+            )
         )
 
     def clear_blend_regions(self) -> None:

@@ -90,6 +90,34 @@ class YarnChanges:
     nodes_left: int
 
 
+@dataclass(frozen=True)
+class Suggestion:
+    """What a suggested region of yarns leaves and costs, as predicted before it is built."""
+
+    #: The wanted tolerance, or what the budget allows.
+    tolerance: float
+    #: Error of triangles alone, and of those that are left, rms over the area.
+    error: float
+    error_left: float
+    #: Largest error of a triangle that is left.
+    largest_left: float
+    #: Triangles that give way to yarns.
+    full_triangles: int
+    #: Nodes of yarns, and of these such as triangles carry.
+    yarn_nodes: int
+    carried_nodes: int
+    #: Triangles that are simulated.
+    active_triangles: int
+    unknowns: int
+    #: Memory of the simulation [bytes].
+    bytes: int
+    #: Time of a drape over that of triangles alone.
+    time_ratio: float
+    #: Nodes with yarns wherever fabrics have them, and the time of that.
+    all_yarn_nodes: int
+    all_time_ratio: float
+
+
 def _fields(value: Any) -> dict[str, Any]:
     skip = ("struct_size", "reserved")
     return {name: getattr(value, name) for name, _ in value._fields_ if name not in skip}

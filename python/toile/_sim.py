@@ -17,7 +17,7 @@ from ._garment import Garment
 from ._interrupt import _Interrupts
 from ._kept import _kept
 from ._owner import _Owner
-from ._report import Energies, Report, SystemInfo, YarnChanges, _fields, _report
+from ._report import Energies, Report, Suggestion, SystemInfo, YarnChanges, _fields, _report
 
 #: ``progress(fraction, stage, residual)``; returning ``False`` stops the drape.
 ProgressCallback = Callable[[float, str, float], Optional[bool]]
@@ -328,6 +328,36 @@ class Sim(_Owner):
     def yarn_forces(self) -> np.ndarray:
         """Force on each node [N], shape (nodes, 3): on a held one what its holder bears."""
         return _copy(lib.toile_sim_yarn_forces, np.float64, self.handle).reshape(-1, 3)
+
+    def suggest_region(
+        self, tolerance: float = 0.0, budget: int = 0, rings: int = 0
+    ) -> tuple[np.ndarray, Suggestion]:
+        """Where yarns would change the answer, from the present state of triangles alone: `alpha` of each
+        vertex, shape (vertices,), for :meth:`Garment.set_blend_vertices`, and what it leaves and costs. At least
+        one of `tolerance`, the largest error left to triangles, and `budget`, the most nodes of yarns."""
+        if not 0 <= budget < 2**64:
+            raise ValueError(f"budget: {budget} must be from 0 to 2^64 - 1")
+        desc = _ffi.new("toile_suggest_desc")
+        desc.tolerance, desc.budget, desc.rings = tolerance, budget, rings
+        out = _ffi.new("toile_suggestion")
+        alpha = np.empty(len(self.vertex_panels))
+        _check(
+            lib.toile_sim_suggest_region(
+                self.handle,
+                ctypes.byref(desc),
+                _pointer(alpha),
+                len(alpha),
+                None,
+                ctypes.byref(out),
+            )
+        )
+        return alpha, Suggestion(**_fields(out))
+
+    @property
+    def vertex_errors(self) -> np.ndarray:
+        """Estimated error of the deformation's gradient of triangles at each vertex, shape (vertices,); 0 where
+        the fabric has no yarns."""
+        return _copy(lib.toile_sim_vertex_errors, np.float64, self.handle)
 
     @property
     def yarn_changes(self) -> YarnChanges:

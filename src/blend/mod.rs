@@ -11,6 +11,7 @@ pub mod follow;
 pub mod region;
 pub mod riders;
 mod support;
+pub mod trace;
 
 pub use coupling::{Coupling, Joined};
 pub use filter::Filter;

@@ -70,13 +70,10 @@ impl Region {
                 ))
                 .at(place(k)));
             }
-            if region.rings > MOST_RINGS {
-                return Err(Error::argument(format!(
-                    "{} hybrid rings around the region of panel '{}', at most {MOST_RINGS} can be",
-                    region.rings, panel.name
-                ))
-                .at(place(k)));
-            }
+            check_rings(region.rings).map_err(|e| {
+                e.at(format!("region of panel '{}'", panel.name))
+                    .at(place(k))
+            })?;
             if region.rings != rings {
                 return Err(Error::unsupported(format!(
                     "{} hybrid rings around the region of panel '{}', {rings} around the first one: all \
@@ -137,6 +134,16 @@ impl Region {
         let sum: f64 = corners.map(|(v, w)| self.alpha[*v as usize] * w).sum();
         sum.clamp(0.0, 1.0)
     }
+}
+
+/// Refuses more hybrid rings than there can be.
+pub fn check_rings(rings: u32) -> Result<()> {
+    if rings <= MOST_RINGS {
+        return Ok(());
+    }
+    Err(Error::argument(format!(
+        "{rings} hybrid rings, at most {MOST_RINGS} can be"
+    )))
 }
 
 fn place(region: usize) -> String {

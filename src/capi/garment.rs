@@ -9,9 +9,11 @@ use super::output;
 use super::panel::{LARGEST_PANEL, panel};
 use super::status::{TOILE_NONE, toile_status};
 use super::types::{toile_garment, toile_garment_desc, toile_panel_desc, toile_seam_desc};
+use crate::blend::trace;
 use crate::error::{Error, Result};
 use crate::math::Vec2;
 use crate::pattern::{BlendRegion, EdgeRef, Fabric, Garment, Panel, Seam, import};
+use crate::tri::triangulate;
 use std::ffi::c_char;
 use std::ptr;
 
@@ -327,6 +329,32 @@ pub unsafe extern "C" fn toile_garment_set_blend_region(
             };
             g.blend_regions.retain(|r| r.panel != panel);
             g.blend_regions.extend(new);
+            Ok(())
+        })
+    })
+}
+
+/// Asks for every yarn in the triangles whose three corners have an `alpha` of 1, with `rings` hybrid rings around them: one number from
+/// 0 to 1 for each vertex of the garment's simulation, shape [count], as toile_sim_suggest_region gives them. Values below 1 are
+/// those of the rings. Takes the place of all earlier regions; 0 everywhere takes them away. The garment must not have
+/// changed since in panels, seams or edge lengths. TOILE_E_ARGUMENT: another number of vertices, a value outside of 0 to 1, or
+/// no triangle has three corners with 1.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_garment_set_blend_vertices(
+    garment: *mut toile_garment,
+    alpha: *const f64,
+    count: usize,
+    rings: u32,
+) -> toile_status {
+    entry!({
+        GARMENTS.get(garment.addr())?;
+        let alpha = input::array(alpha, count, input::LARGEST_COUNT, "alpha")?.to_vec();
+        edit(garment, |g| {
+            // estimates are rough; far more vertices than values are refused before they are made
+            let most = 2 * alpha.len() + 1000;
+            g.check_within(most)?;
+            let mesh = triangulate(g, 1.0, most)?;
+            g.blend_regions = trace::from_alpha(&mesh, &alpha, rings)?;
             Ok(())
         })
     })

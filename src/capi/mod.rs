@@ -15,7 +15,7 @@
 //!   a slice is made of it, and copied before an object is locked for writing, because it may point
 //!   into that very object (a view).
 //! * one file for each object: [`garment`] (with `panel` and [`garment_readout`]), [`body`], [`sim`]
-//!   (with [`motion`] and [`readout`]).
+//!   (with [`motion`], [`readout`] and [`suggest`]).
 //!
 //! The comments of exported items are the header's text: they are written for C readers, and name
 //! the unit and the shape of every array.
@@ -49,6 +49,7 @@ pub mod motion;
 pub mod readout;
 pub mod sim;
 pub mod status;
+pub mod suggest;
 pub mod types;
 pub mod yarns;
 
@@ -60,5 +61,6 @@ pub use motion::*;
 pub use readout::*;
 pub use sim::*;
 pub use status::*;
+pub use suggest::*;
 pub use types::*;
 pub use yarns::*;

@@ -332,6 +332,56 @@ pub struct toile_yarn_changes {
     pub nodes_left: u64,
 }
 
+/// Which region of yarns is wanted: at least one of tolerance and budget.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct toile_suggest_desc {
+    /// sizeof(toile_suggest_desc).
+    pub struct_size: usize,
+    /// Largest error of the deformation's gradient that is left to triangles, from 0.001; 0 (default) is none given.
+    pub tolerance: f64,
+    /// Most nodes of yarns; 0 (default) is no limit.
+    pub budget: u64,
+    /// Hybrid rings around the region, 0 (default) to 3.
+    pub rings: u32,
+    /// 0.
+    pub reserved: u32,
+}
+
+/// What a suggested region leaves and costs, as predicted before it is built.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct toile_suggestion {
+    /// sizeof(toile_suggestion), set by the caller.
+    pub struct_size: usize,
+    /// Tolerance that the region is one for: the wanted one, or what the budget allows.
+    pub tolerance: f64,
+    /// Error of triangles alone, root mean square over the area.
+    pub error: f64,
+    /// Same of the triangles that are left.
+    pub error_left: f64,
+    /// Largest error of a triangle that is left.
+    pub largest_left: f64,
+    /// Triangles that give way to yarns; 0 where no yarns are needed.
+    pub full_triangles: u64,
+    /// Nodes of yarns, those that triangles carry included.
+    pub yarn_nodes: u64,
+    /// Nodes that triangles carry.
+    pub carried_nodes: u64,
+    /// Triangles that are simulated.
+    pub active_triangles: u64,
+    /// Scalar unknowns.
+    pub unknowns: u64,
+    /// Memory of the simulation [bytes].
+    pub bytes: u64,
+    /// Time of a drape over that of triangles alone.
+    pub time_ratio: f64,
+    /// Nodes of yarns wherever fabrics have them, for comparison.
+    pub all_yarn_nodes: u64,
+    /// Time of a drape with yarns wherever fabrics have them over that of triangles alone.
+    pub all_time_ratio: f64,
+}
+
 /// Numbers that lie in the library's memory. Valid until the next call on the same handle whose
 /// handle is not const; compare `epoch` with toile_sim_epoch to find out.
 #[repr(C)]
@@ -406,6 +456,12 @@ versioned! {
         min_angle: 0.0, active_triangles: 0, carried_nodes: 0,
     }
     toile_yarn_changes { epoch: 0, passages_gone: 0, nodes_split: 0, nodes_left: 0 }
+    toile_suggest_desc { tolerance: 0.0, budget: 0, rings: 0, reserved: 0 }
+    toile_suggestion {
+        tolerance: 0.0, error: 0.0, error_left: 0.0, largest_left: 0.0, full_triangles: 0,
+        yarn_nodes: 0, carried_nodes: 0, active_triangles: 0, unknowns: 0, bytes: 0, time_ratio: 0.0,
+        all_yarn_nodes: 0, all_time_ratio: 0.0,
+    }
     toile_view_f64 { data: ptr::null(), count: 0, components: 0, stride: 0, epoch: 0 }
 }
 
@@ -503,6 +559,24 @@ pub unsafe extern "C" fn toile_system_info_init(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn toile_yarn_changes_init(
     out: *mut toile_yarn_changes,
+    struct_size: usize,
+) -> toile_status {
+    entry!({ desc::init(out, struct_size) })
+}
+
+/// Fills a description of a wanted region of `struct_size` bytes with defaults and its own size.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_suggest_desc_init(
+    desc: *mut toile_suggest_desc,
+    struct_size: usize,
+) -> toile_status {
+    entry!({ desc::init(desc, struct_size) })
+}
+
+/// Fills a suggestion of `struct_size` bytes with zeros and its own size.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_suggestion_init(
+    out: *mut toile_suggestion,
     struct_size: usize,
 ) -> toile_status {
     entry!({ desc::init(out, struct_size) })

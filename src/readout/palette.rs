@@ -31,6 +31,22 @@ pub fn panel(index: u32) -> [f32; 3] {
     PANELS[index as usize % PANELS.len()]
 }
 
+const HEAT: [[f32; 3]; 4] = [
+    [0.88, 0.88, 0.86],
+    [0.93, 0.78, 0.48],
+    [0.83, 0.38, 0.25],
+    [0.42, 0.08, 0.20],
+];
+
+/// Colour of an amount from 0, pale, to 1, dark red.
+pub fn heat(amount: f64) -> [f32; 3] {
+    let last = HEAT.len() - 1;
+    let at = amount.clamp(0.0, 1.0) as f32 * last as f32;
+    let low = (at as usize).min(last - 1);
+    let part = at - low as f32;
+    [0, 1, 2].map(|c| HEAT[low][c] * (1.0 - part) + HEAT[low + 1][c] * part)
+}
+
 /// One sRGB channel to linear light (IEC 61966-2-1).
 pub fn to_linear(c: f32) -> f32 {
     if c <= 0.04045 {

@@ -16,6 +16,9 @@
 //! compared: its distance from the reference says nothing about the model.
 
 mod page;
+mod rivals;
+
+pub use rivals::rivals;
 
 use crate::blend::embed::carried;
 use crate::error::{Error, Result};
@@ -117,6 +120,13 @@ pub fn run(scene: &Scene, watch: &mut dyn FnMut(&str)) -> Result<Report> {
             "a report compares where the garment has blend regions; it has none",
         ));
     }
+    check(scene)?;
+    let points = Points::new(&build(scene)?)?;
+    compared(scene, points, models(&scene.garment)?, watch)
+}
+
+/// Refuses scenes whose models cannot all be draped.
+fn check(scene: &Scene) -> Result<()> {
     if !scene.run.drape {
         return Err(Error::argument(
             "a report compares drapes; the scene does not drape",
@@ -127,11 +137,20 @@ pub fn run(scene: &Scene, watch: &mut dyn FnMut(&str)) -> Result<Report> {
             "a report runs several meshes; the scene begins with a state of one",
         ));
     }
-    let points = Points::new(&build(scene)?)?;
+    Ok(())
+}
+
+/// Drapes models and compares each with the most detailed one at rest.
+fn compared(
+    scene: &Scene,
+    points: Points,
+    models: Vec<(String, Kind, Garment)>,
+    watch: &mut dyn FnMut(&str),
+) -> Result<Report> {
     let mut rows = Vec::new();
     let mut places: Vec<Option<Vec<Vec3>>> = Vec::new();
     let mut start: Option<Start> = None;
-    for (name, kind, garment) in models(&scene.garment)? {
+    for (name, kind, garment) in models {
         watch(&name);
         let scene = Scene {
             garment,
@@ -204,10 +223,16 @@ fn models(garment: &Garment) -> Result<Vec<(String, Kind, Garment)>> {
         }
         list.push((format!("mixed, regions x {scale}"), Kind::Mixed, g));
     }
-    let mut g = garment.clone();
-    let mut panels: Vec<u32> = g.blend_regions.iter().map(|r| r.panel).collect();
+    let mut panels: Vec<u32> = garment.blend_regions.iter().map(|r| r.panel).collect();
     panels.sort_unstable();
     panels.dedup();
+    list.push(("yarns".into(), Kind::Yarns, whole(garment, panels)?));
+    Ok(list)
+}
+
+/// The garment with yarns on all of some panels.
+fn whole(garment: &Garment, panels: Vec<u32>) -> Result<Garment> {
+    let mut g = garment.clone();
     g.blend_regions.clear();
     for panel in panels {
         let bounds = g.panels[panel as usize].bounds()?;
@@ -225,8 +250,7 @@ fn models(garment: &Garment) -> Result<Vec<(String, Kind, Garment)>> {
             rings: 0,
         });
     }
-    list.push(("yarns".into(), Kind::Yarns, g));
-    Ok(list)
+    Ok(g)
 }
 
 impl Row {

@@ -51,7 +51,7 @@ pub struct Membrane {
 }
 
 /// Flat to (weft, warp) coordinates for a warp at `grain` from `+v`.
-pub(super) fn material_rotation(grain: f64) -> Mat2 {
+pub fn material_rotation(grain: f64) -> Mat2 {
     let (s, c) = grain.sin_cos();
     Mat2::new(c, s, -s, c)
 }

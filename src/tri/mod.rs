@@ -74,6 +74,17 @@ pub struct SeamLink {
 }
 
 impl GarmentMesh {
+    /// For each vertex whether a seam ties it, or ties something to an edge of it.
+    pub fn sewn(&self) -> Vec<bool> {
+        let mut sewn = vec![false; self.uv.len()];
+        for link in self.seams.iter().flat_map(|s| &s.links) {
+            for v in [link.vertex, link.edge[0], link.edge[1]] {
+                sewn[v as usize] = true;
+            }
+        }
+        sewn
+    }
+
     /// Leaves out some triangles, and the ties of seams to vertices that have none left; vertices
     /// stay, without triangles.
     pub fn without_triangles(&self, left_out: &[bool]) -> Self {

@@ -42,7 +42,7 @@ pub fn has(program: &str) -> bool {
 }
 
 /// Source files of the C interface in the order of the header.
-pub const SOURCES: [&str; 11] = [
+pub const SOURCES: [&str; 12] = [
     "status.rs",
     "log.rs",
     "types.rs",
@@ -53,6 +53,7 @@ pub const SOURCES: [&str; 11] = [
     "motion.rs",
     "readout.rs",
     "yarns.rs",
+    "suggest.rs",
     "array.rs",
 ];
 

@@ -57,6 +57,8 @@ pub(crate) enum Command {
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
     },
+    /// Drapes a scene by triangles alone and suggests where yarns would change the answer, and what they would cost.
+    Suggest(SuggestArgs),
     /// Draws model files: front, side and back beside each other, y up.
     Picture {
         /// Garment (OBJ, metres); each connected piece gets its own colour.
@@ -126,6 +128,31 @@ pub(crate) struct FabricArgs {
     /// Steps to the largest of each, by default 4 for a weave, 20 for a knit.
     #[arg(long, value_name = "N")]
     pub(crate) steps: Option<usize>,
+}
+
+/// Which region to suggest.
+#[derive(Args)]
+pub(crate) struct SuggestArgs {
+    #[command(flatten)]
+    pub(crate) scene: SceneArgs,
+    /// Largest error of the deformation's gradient that is left to triangles, from 0.001; needed without a budget.
+    #[arg(long, value_name = "T", required_unless_present = "budget")]
+    pub(crate) tolerance: Option<f64>,
+    /// Most nodes of yarns.
+    #[arg(long, value_name = "N")]
+    pub(crate) budget: Option<u64>,
+    /// Hybrid rings around the region, 0 to 3.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) rings: u32,
+    /// Also drapes the scene's own regions, suggested ones of as many nodes, and yarns everywhere, and compares them.
+    #[arg(long)]
+    pub(crate) compare: bool,
+    /// Width and height of the picture [pixel].
+    #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size)]
+    pub(crate) picture_size: Option<[usize; 2]>,
+    /// Folder for region.json, garment.json and a picture of the error; made if it is not there.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
 }
 
 /// How to run.

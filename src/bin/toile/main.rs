@@ -12,6 +12,7 @@ mod output;
 mod picture;
 mod report;
 mod run;
+mod suggest;
 mod summary;
 mod yarns;
 
@@ -45,6 +46,7 @@ fn main() -> ExitCode {
         Command::Yarns { scene, out } => yarns::yarns(scene, out),
         Command::Fabric(args) => fabric::fabric(args),
         Command::Report { scene, out } => report::report(scene, out),
+        Command::Suggest(args) => suggest::suggest(args),
         Command::Picture {
             garment,
             body,

@@ -5,8 +5,10 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use toile::body::read_obj;
 use toile::error::Error;
+use toile::math::Vec3;
 use toile::readout::Part;
 use toile::readout::picture::{PictureOptions, render};
+use toile::scene::Scene;
 
 /// Options for a picture of this width and height, if they were given [pixel].
 pub(crate) fn sized(size: Option<[usize; 2]>) -> PictureOptions {
@@ -15,6 +17,24 @@ pub(crate) fn sized(size: Option<[usize; 2]>) -> PictureOptions {
         (options.width, options.height) = (width, height);
     }
     options
+}
+
+/// Options for a picture of a scene: up is against its gravity.
+pub(crate) fn upright(scene: &Scene, size: Option<[usize; 2]>) -> PictureOptions {
+    let up = -Vec3::from(scene.gravity);
+    let options = PictureOptions {
+        // up is against gravity; without gravity it is y
+        up: up.try_normalize(1e-9).unwrap_or_else(Vec3::y),
+        ..sized(size)
+    };
+    if options.up.cross(&options.front).norm() < 1e-3 {
+        PictureOptions {
+            front: -Vec3::y(),
+            ..options
+        }
+    } else {
+        options
+    }
 }
 
 pub(crate) fn picture(

@@ -5,6 +5,7 @@ use crate::info::load;
 use crate::output::{Done, Failure, err, file, out};
 use std::fmt::Write;
 use std::path::Path;
+use toile::report::Report;
 
 pub(crate) fn report(args: &SceneArgs, dir: &Path) -> Done {
     std::fs::create_dir_all(dir).map_err(|e| Failure {
@@ -17,15 +18,27 @@ pub(crate) fn report(args: &SceneArgs, dir: &Path) -> Done {
     file(&dir.join("report.json"), json.as_bytes())?;
     file(&dir.join("report.csv"), report.to_csv().as_bytes())?;
     file(&dir.join("report.html"), report.to_html().as_bytes())?;
+    out(&table(&report))
+}
+
+/// One line for each model.
+pub(crate) fn table(report: &Report) -> String {
     let mut text = format!(
-        "{:<24} {:>9} {:>9} {:>9} {:>11} {:>8} {:>12}\n",
-        "model", "unknowns", "Newton", "seconds", "error [mm]", "height", "correlation"
+        "{:<24} {:>10} {:>9} {:>9} {:>9} {:>11} {:>8} {:>12}\n",
+        "model",
+        "yarn nodes",
+        "unknowns",
+        "Newton",
+        "seconds",
+        "error [mm]",
+        "height",
+        "correlation"
     );
     for row in &report.rows {
         let _ = write!(
             text,
-            "{:<24} {:>9} {:>9} {:>9.2} ",
-            row.name, row.unknowns, row.newton_iterations, row.seconds
+            "{:<24} {:>10} {:>9} {:>9} {:>9.2} ",
+            row.name, row.yarn_nodes, row.unknowns, row.newton_iterations, row.seconds
         );
         let _ = match row.deviation {
             Some(d) => writeln!(
@@ -40,5 +53,5 @@ pub(crate) fn report(args: &SceneArgs, dir: &Path) -> Done {
             None => writeln!(text, "{}", row.reason),
         };
     }
-    out(&text)
+    text
 }

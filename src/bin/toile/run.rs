@@ -3,7 +3,7 @@
 use crate::args::RunArgs;
 use crate::info::load;
 use crate::output::{Done, Failure, file, not_written, out};
-use crate::picture::sized;
+use crate::picture::upright;
 use crate::summary::{Summary, table};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::process::ExitCode;
@@ -11,7 +11,7 @@ use std::time::Instant;
 use toile::error::Error;
 use toile::math::{Vec3, topology};
 use toile::readout::export::{gltf, obj, pc2};
-use toile::readout::picture::{PictureOptions, render};
+use toile::readout::picture::render;
 use toile::readout::{Part, crossings, yarns};
 use toile::scene::Scene;
 use toile::sim::{DrapeOptions, Outcome, Progress, Sim, StepReport};
@@ -233,21 +233,7 @@ fn write(
             text: format!("cannot remove {}: {e}", motion.display()),
         })?;
     }
-    let up = -Vec3::from(scene.gravity);
-    let options = PictureOptions {
-        // up is against gravity; without gravity it is y
-        up: up.try_normalize(1e-9).unwrap_or_else(Vec3::y),
-        ..sized(args.picture_size)
-    };
-    let options = if options.up.cross(&options.front).norm() < 1e-3 {
-        PictureOptions {
-            front: -Vec3::y(),
-            ..options
-        }
-    } else {
-        options
-    };
-    render(&parts, &options)?
+    render(&parts, &upright(scene, args.picture_size))?
         .write_png(&dir.join("picture.png"))
         .map_err(not_written)?;
     let svg = toile::pattern::export::to_svg(&scene.garment, 0.01);

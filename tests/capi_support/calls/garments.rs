@@ -85,7 +85,7 @@ pub(super) fn edit_garment(world: &World, choices: &mut Choices<'_>) -> toile_st
     let fabric = fabric[choices.below(4)];
     let length = fabric.to_bytes().len();
     let status = unsafe {
-        match choices.below(7) {
+        match choices.below(8) {
             0 => {
                 let mut seam = filled(toile_seam_desc_init);
                 seam.panel_a = choices.index();
@@ -105,6 +105,10 @@ pub(super) fn edit_garment(world: &World, choices: &mut Choices<'_>) -> toile_st
                 toile_garment_set_blend_region(garment, panel, uv.as_ptr(), count, rings)
             }
             5 => toile_garment_clear_blend_region(garment),
+            6 => {
+                let (count, rings) = (choices.count(8), choices.index());
+                toile_garment_set_blend_vertices(garment, uv.as_ptr(), count, rings)
+            }
             _ => toile_garment_check(garment),
         }
     };

@@ -1,0 +1,169 @@
+//! What a region costs, before it is built.
+//!
+//! A weave has a node for each crossing, a knit four for each loop. Inside of a region nodes move by themselves; energies reach `b`
+//! nodes beyond its border along every yarn that crosses it, and those ride on triangles. At the outline of a panel yarns have ends, and a
+//! seam's rod has nodes for those of one of its sides:
+//!
+//! ```text
+//! nodes = sum_T A_T rho + sum_outline n_yarns + 1/2 sum_sewn n_yarns + b sum_border n_yarns
+//! unknowns = 3 (nodes that move + vertices with triangles of their own)
+//! ```
+//!
+//! The time of a drape is the power 1.8 of the unknowns, fitted to the mixed and whole models of three scenes (`docs/mixed.md`), from which
+//! they are up to three times away, and memory a line through the models of `examples/pucker.json`. Unknowns of sliding are left out: they come and go with the contacts that slide.
+
+use crate::blend::Region;
+use crate::math::{Vec2, topology};
+use crate::pattern::Garment;
+use crate::pattern::yarn_fabric::Structure;
+use crate::tri::GarmentMesh;
+use crate::yarn::Cell;
+use std::collections::BTreeSet;
+
+/// Nodes of a loop.
+const LOOP_NODES: f64 = 4.0;
+/// Nodes beyond the border along each yarn of a weave, and rows of loops beyond that of a knit, as counted at borders of regions.
+const BEYOND: [f64; 2] = [1.6, 0.8];
+/// Nodes of a seam's rod for each yarn that ends there, on either side.
+const ROD: f64 = 0.5;
+/// Power of the unknowns that the time of a drape grows with.
+const TIME_EXPONENT: f64 = 1.8;
+/// Memory [bytes]: of what every simulation has, and of each unknown with its terms, matrix and factor.
+const BYTES: [f64; 2] = [3.7e6, 4300.0];
+
+/// Predicted cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Cost {
+    /// Nodes of yarns, carried ones included.
+    pub yarn_nodes: u64,
+    /// Nodes among them that triangles carry.
+    pub carried_nodes: u64,
+    /// Triangles that are simulated.
+    pub triangles: u64,
+    /// Scalar unknowns.
+    pub unknowns: u64,
+    /// Time over that of triangles alone.
+    pub time_ratio: f64,
+    /// Memory [bytes].
+    pub bytes: u64,
+}
+
+/// What yarns cost on a mesh.
+pub struct Predictor<'a> {
+    mesh: &'a GarmentMesh,
+    /// Nodes in each triangle.
+    inside: Vec<f64>,
+    /// Edges of two triangles: these, and nodes that yarns have beyond the edge.
+    borders: Vec<([u32; 2], f64)>,
+}
+
+/// How densely yarns lie in a panel.
+struct Density {
+    /// Direction across the cloth.
+    across: Vec2,
+    /// Distances of yarns or loops as laid, across and along [m].
+    pitch: [f64; 2],
+    /// Nodes for each of them.
+    nodes: f64,
+    /// How many of them energies reach beyond a border.
+    beyond: f64,
+}
+
+impl Density {
+    fn of(garment: &Garment, panel: usize, cells: &[Cell]) -> Option<Self> {
+        let panel = &garment.panels[panel];
+        let yarns = garment.fabrics[panel.fabric].yarns.as_ref()?;
+        let cell = cells.get(panel.fabric).copied().unwrap_or_default();
+        let [a, b] = yarns.structure.pitch();
+        let (nodes, beyond) = match yarns.structure {
+            Structure::Woven(_) => (1.0, BEYOND[0]),
+            Structure::Knitted(_) => (LOOP_NODES, BEYOND[1]),
+        };
+        Some(Self {
+            across: Vec2::new(panel.grain.cos(), panel.grain.sin()),
+            pitch: [a * cell.across, b * cell.along],
+            nodes,
+            beyond,
+        })
+    }
+
+    /// Yarns or loops that an edge crosses.
+    fn crossed(&self, edge: Vec2) -> f64 {
+        let across = edge.dot(&self.across).abs() / self.pitch[0];
+        let along = edge.perp(&self.across).abs() / self.pitch[1];
+        across + along
+    }
+}
+
+impl<'a> Predictor<'a> {
+    /// For a garment's mesh; `cells` says how its fabrics are laid.
+    pub fn new(garment: &Garment, mesh: &'a GarmentMesh, cells: &[Cell]) -> Self {
+        let densities: Vec<Option<Density>> = (0..garment.panels.len())
+            .map(|p| Density::of(garment, p, cells))
+            .collect();
+        let density = |t: usize| densities[mesh.triangle_panel[t] as usize].as_ref();
+        let outline: BTreeSet<[u32; 2]> = topology::boundary_edges(&mesh.triangles)
+            .into_iter()
+            .collect();
+        let sewn = mesh.sewn();
+        let inside = (mesh.triangles.iter().enumerate()).map(|(t, tri)| {
+            let Some(density) = density(t) else {
+                return 0.0;
+            };
+            let [a, b, c] = tri.map(|v| mesh.uv[v as usize]);
+            let area = 0.5 * (b - a).perp(&(c - a)).abs();
+            let ends: f64 = (0..3)
+                .map(|k| [tri[k], tri[(k + 1) % 3]])
+                .filter(|[a, b]| outline.contains(&[*a.min(b), *a.max(b)]))
+                .map(|side| {
+                    let [a, b] = side.map(|v| mesh.uv[v as usize]);
+                    let rod = if side.iter().all(|v| sewn[*v as usize]) {
+                        ROD
+                    } else {
+                        0.0
+                    };
+                    (1.0 + rod) * density.crossed(b - a)
+                })
+                .sum();
+            ends + density.nodes * area / (density.pitch[0] * density.pitch[1])
+        });
+        let borders = (topology::inner_edges(&mesh.triangles).into_iter()).map(|(edge, beside)| {
+            let [a, b] = edge.map(|v| mesh.uv[v as usize]);
+            let beyond = |d: &Density| d.beyond * d.nodes * d.crossed(b - a);
+            (beside, density(beside[0] as usize).map_or(0.0, beyond))
+        });
+        Self {
+            inside: inside.collect(),
+            borders: borders.collect(),
+            mesh,
+        }
+    }
+
+    /// Of a region.
+    pub fn cost(&self, region: &Region) -> Cost {
+        let triangles = 0..self.mesh.triangles.len();
+        let own: f64 = (triangles.clone().filter(|t| region.has_yarns(*t)))
+            .map(|t| self.inside[t])
+            .sum();
+        let has = |t: u32| region.has_yarns(t as usize);
+        let beyond: f64 = (self.borders.iter())
+            .filter(|([a, b], _)| has(*a) != has(*b))
+            .map(|(_, nodes)| nodes)
+            .sum();
+        let mut bare = vec![true; self.mesh.uv.len()];
+        let kept: Vec<usize> = triangles.filter(|t| !region.full[*t]).collect();
+        for v in kept.iter().flat_map(|t| self.mesh.triangles[*t]) {
+            bare[v as usize] = false;
+        }
+        let vertices = bare.iter().filter(|bare| !**bare).count();
+        let unknowns = 3.0 * (own + vertices as f64);
+        Cost {
+            yarn_nodes: (own + beyond).ceil() as u64,
+            carried_nodes: beyond.ceil() as u64,
+            triangles: kept.len() as u64,
+            unknowns: unknowns.ceil() as u64,
+            time_ratio: (unknowns / (3 * self.mesh.uv.len()) as f64).powf(TIME_EXPONENT),
+            bytes: (BYTES[0] + unknowns * BYTES[1]) as u64,
+        }
+    }
+}

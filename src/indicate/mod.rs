@@ -1,0 +1,145 @@
+//! Where yarns would change the answer: from a state of triangles alone to a region of yarns and what it costs.
+//!
+//! [`indicator`] estimates an error of the triangles at every vertex, [`grow`] makes a region of the places where it is
+//! above a tolerance, [`cost`] predicts what that region costs. A budget of nodes is met by the least tolerance whose region keeps to
+//! it. Everything here reads the mesh and positions alone, one vertex after the other, so that nothing depends on threads.
+
+pub mod cost;
+pub mod grow;
+pub mod indicator;
+
+use crate::blend::{Region, trace};
+use crate::error::{Error, Result};
+use crate::math::Vec3;
+use crate::pattern::{BlendRegion, Garment};
+use crate::tri::GarmentMesh;
+use crate::yarn::Cell;
+use cost::{Cost, Predictor};
+use grow::Growth;
+use indicator::Indicator;
+
+/// Least tolerance: errors below it are those of rounding and of a drape's own residual.
+pub const LEAST_TOLERANCE: f64 = 1e-3;
+/// Most that a tolerance can be.
+pub const LARGEST_TOLERANCE: f64 = 1e3;
+
+/// What region is asked for: at least one of tolerance and budget.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Wish {
+    /// Largest error that is left to triangles; `None` is [`LEAST_TOLERANCE`], with a budget.
+    pub tolerance: Option<f64>,
+    /// Most nodes of yarns; `None` is no limit.
+    pub budget: Option<u64>,
+    /// Hybrid rings around the region.
+    pub rings: u32,
+}
+
+/// A region and why.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Suggestion {
+    /// The criteria and the error of every vertex.
+    pub indicator: Indicator,
+    /// Which triangles give way to yarns.
+    pub region: Region,
+    /// The same as polygons, for garments and scenes; none where nothing is suggested.
+    pub regions: Vec<BlendRegion>,
+    /// The tolerance that the region is one for: the wish's, or what its budget allows.
+    pub tolerance: f64,
+    /// Root mean square of the error over the area, of triangles alone and of those that are left.
+    pub errors: [f64; 2],
+    /// Largest error of triangles that are left.
+    pub largest_left: f64,
+    /// Prediction for the region.
+    pub cost: Cost,
+    /// Prediction for triangles alone.
+    pub triangles: Cost,
+    /// Prediction for yarns wherever fabrics have them.
+    pub everywhere: Cost,
+}
+
+impl Wish {
+    fn check(&self) -> Result<f64> {
+        if self.tolerance.is_none() && self.budget.is_none() {
+            return Err(Error::argument(
+                "a region needs a tolerance or a budget of yarn nodes: neither is given",
+            ));
+        }
+        let tolerance = self.tolerance.unwrap_or(LEAST_TOLERANCE);
+        if !(LEAST_TOLERANCE..=LARGEST_TOLERANCE).contains(&tolerance) {
+            return Err(Error::argument(format!(
+                "tolerance {tolerance} must be from {LEAST_TOLERANCE} to {LARGEST_TOLERANCE}"
+            )));
+        }
+        if self.budget == Some(0) {
+            return Err(Error::argument("a budget of 0 yarn nodes allows no yarns"));
+        }
+        crate::blend::region::check_rings(self.rings)?;
+        Ok(tolerance)
+    }
+}
+
+/// The region that a garment of triangles alone wants at these positions. `cells` says how fabrics are laid.
+pub fn suggest(
+    garment: &Garment,
+    mesh: &GarmentMesh,
+    positions: &[Vec3],
+    cells: &[Cell],
+    wish: &Wish,
+) -> Result<Suggestion> {
+    let wanted = wish.check()?;
+    let has_yarns = |panel: u32| {
+        let panel = &garment.panels[panel as usize];
+        garment.fabrics[panel.fabric].yarns.is_some()
+    };
+    if !mesh.triangle_panel.iter().any(|p| has_yarns(*p)) {
+        return Err(Error::argument(
+            "no panel has a fabric with yarns: there is nothing to suggest",
+        ));
+    }
+    let may: Vec<bool> = mesh.triangle_panel.iter().map(|p| has_yarns(*p)).collect();
+    let indicator = Indicator::new(garment, mesh, positions)?;
+    let growth = Growth::new(mesh, &indicator.error, may.clone());
+    let predictor = Predictor::new(garment, mesh, cells);
+    let at = |tolerance: f64| {
+        let region = Region::around(mesh, growth.full(tolerance), wish.rings);
+        let cost = predictor.cost(&region);
+        (region, cost)
+    };
+    let mut tolerance = wanted;
+    let (mut region, mut cost) = at(tolerance);
+    if let Some(budget) = wish.budget.filter(|b| cost.yarn_nodes > *b) {
+        // regions shrink as the tolerance grows: the least level that keeps to the budget
+        let mut levels: Vec<f64> = growth.levels().filter(|l| *l > wanted).collect();
+        levels.sort_unstable_by(f64::total_cmp);
+        levels.push(f64::MAX);
+        let within = |l: &f64| at(*l).1.yarn_nodes <= budget;
+        let first = levels.partition_point(|l| !within(l));
+        tolerance = levels[first.min(levels.len() - 1)];
+        (region, cost) = at(tolerance);
+    }
+    let left = |all: bool| {
+        let kept = (0..mesh.triangles.len()).filter(|t| all || !region.full[*t]);
+        let [sum, area] = kept.fold([0.0; 2], |[sum, area], t| {
+            let e = indicator.of_triangle(mesh, t);
+            [sum + e * e * indicator.areas[t], area + indicator.areas[t]]
+        });
+        if area > 0.0 { (sum / area).sqrt() } else { 0.0 }
+    };
+    let largest_left = (0..mesh.triangles.len())
+        .filter(|t| !region.full[*t])
+        .map(|t| indicator.of_triangle(mesh, t))
+        .fold(0.0, f64::max);
+    let none = Region::around(mesh, vec![false; may.len()], 0);
+    let all = Region::around(mesh, may, 0);
+    Ok(Suggestion {
+        errors: [left(true), left(false)],
+        largest_left,
+        regions: trace::polygons(mesh, &region.full, wish.rings),
+        tolerance,
+        cost,
+        triangles: predictor.cost(&none),
+        everywhere: predictor.cost(&all),
+        region,
+        indicator,
+    })
+}
