@@ -303,6 +303,7 @@ impl Engine {
             },
             hasty: system.has_yarns(),
             strict: rest,
+            settle: !rest && system.has_yarns(),
         };
         let linear = if rest {
             self.direct.as_mut()

@@ -6,6 +6,7 @@ pub mod drape;
 mod drift;
 pub mod engine;
 pub mod linear;
+mod local;
 pub mod newton;
 mod pace;
 pub mod relax;

@@ -8,6 +8,7 @@
 //! uses the same with `v0 = 0`. No step is accepted that raises `Phi`.
 
 use super::linear::{LinearError, LinearSolver};
+use super::local::Local;
 use crate::blend::Coupling;
 use crate::error::{Error, Result, Status};
 use crate::math::Vec3;
@@ -56,6 +57,8 @@ pub struct Tolerance {
     /// Whether a matrix that is not positive definite ends the solve instead of being made so by
     /// less of the exact Hessian.
     pub strict: bool,
+    /// Whether the few blocks that are worse than all others are solved for by themselves between corrections.
+    pub settle: bool,
 }
 
 /// How a solve ended.
@@ -120,6 +123,7 @@ pub struct Work {
     negative: Vec<Vec3>,
     direction: Vec<Vec3>,
     trial: Vec<Vec3>,
+    local: Local,
 }
 
 impl Work {
@@ -144,7 +148,7 @@ const AGREES: f64 = 0.5;
 const DOUBTS: u32 = 4;
 
 impl Problem<'_> {
-    fn at<'b>(&'b self, x: &'b [Vec3]) -> Configuration<'b> {
+    pub(super) fn at<'b>(&'b self, x: &'b [Vec3]) -> Configuration<'b> {
         Configuration {
             x,
             x0: self.x0,
@@ -235,6 +239,19 @@ impl Problem<'_> {
         residual
     }
 
+    /// The gradient of `Phi` where it is free.
+    fn slope(&self, x: &[Vec3], assembler: &mut Assembler, gradient: &mut [Vec3]) {
+        gradient.fill(Vec3::zeros());
+        assembler.add(self.terms, &self.at(x), None, self.workers, gradient);
+        for (i, g) in gradient.iter_mut().enumerate() {
+            if self.fixed[i] {
+                g.fill(0.0);
+            } else {
+                *g += (x[i] - self.inertia.center[i]) * self.inertia.weight[i];
+            }
+        }
+    }
+
     /// Largest force on a free vertex at `x` [N], and how far the free vertices would be carried if
     /// nothing but inertia resisted it [m].
     fn remains(&self, x: &[Vec3], assembler: &mut Assembler, gradient: &mut [Vec3]) -> (f64, f64) {
@@ -320,6 +337,10 @@ impl Problem<'_> {
         if !value.is_finite() {
             return Err(not_finite(&self.unbounded(x)));
         }
+        work.local.forget();
+        // groups do not know of riders and filters
+        let joined = self.coupling.filter.is_some() || !self.coupling.riders.list().is_empty();
+        let settles = tolerance.settle && !joined;
         let mut exactness = tolerance.exactness;
         let mut doubts = 0;
         let first = tolerance.first.unwrap_or(value);
@@ -391,12 +412,28 @@ impl Problem<'_> {
             let noise = 1e-13 * value.abs().max(1e-12);
             let mut length = 1.0;
             let mut gain = 0.0;
+            let mut mended = !settles;
             loop {
                 for i in 0..n {
                     work.trial[i] = x[i] + work.direction[i] * length;
                 }
-                let trial = self.value(&work.trial);
-                if trial <= value + 1e-4 * length * slope + noise {
+                let mut trial = self.value(&work.trial);
+                let most = value + 1e-4 * length * slope + noise;
+                if !mended && trial.is_finite() && trial > most {
+                    mended = true;
+                    self.slope(&work.trial, assembler, &mut work.negative);
+                    let matrix = assembler.matrix();
+                    let Work {
+                        local,
+                        negative,
+                        trial: at,
+                        ..
+                    } = &mut *work;
+                    if local.settle(self, matrix, negative, at) {
+                        trial = self.value(at);
+                    }
+                }
+                if trial <= most {
                     x.copy_from_slice(&work.trial);
                     gain = value - trial;
                     value = trial;
@@ -452,6 +489,13 @@ impl Problem<'_> {
                     return Ok(summary);
                 }
                 doubts += 1;
+            }
+            if settles && iteration + 1 < tolerance.iterations {
+                self.slope(x, assembler, &mut work.negative);
+                let matrix = assembler.matrix();
+                if work.local.settle(self, matrix, &work.negative, x) {
+                    value = self.value(x);
+                }
             }
         }
         Ok(summary)

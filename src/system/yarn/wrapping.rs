@@ -11,8 +11,9 @@
 //!
 //! (Cirio et al. 2017, equations 2 and 7 to 16, whose derivatives are those of the signed angle, not of the printed
 //! `arccos`.) `beta` is the angle between the axis and a wing: without `W` the gradient grows as `1/beta` where
-//! a wing lies along the axis. `Psd` is the square of the gradient of `(psi - psi0) sqrt(W_a W_b)`. Damping acts on
-//! `psi` with the weight `beta/dt k_w L W_a W_b` of the start of the step. No material coordinate enters.
+//! a wing lies along the axis. `Psd` is the square of the gradient of `(psi - psi0) sqrt(W_a W_b)`. Damping is the same
+//! energy with `beta/dt k_w` and the `psi` of the start of the step in place of `k_w` and `psi0`; with guards of the start
+//! it would be a wall where a wing passes the axis. No material coordinate enters.
 //! SI units; `k_w` in N.
 
 use super::kernel::{Kernel, Local, Lower, add_block, add_product, add_square, point, set_point};
@@ -152,19 +153,22 @@ impl Wrapping {
         dihedral_gradient(x, self.floor()).map(|g| g * -self.sign)
     }
 
-    /// Weight of the damping and change of the angle.
-    fn damped(&self, at: &Local<'_, 12>, psi: f64) -> (f64, f64) {
+    /// Stiffness [N m] and angle [rad] of the elastic energy and of damping.
+    fn parts(&self, at: &Local<'_, 12>, psi: f64) -> [(f64, f64); 2] {
         let rate = self.damping * at.inv_dt;
-        if rate > 0.0 {
-            let start = points(at.q0);
-            let [a, b] = guards(&start, self.length_floor());
-            (
-                rate * self.stiffness * a.value * b.value,
-                wrap_angle(psi - self.angle(&start)),
-            )
+        let damped = if rate > 0.0 {
+            let since = wrap_angle(psi - self.angle(&points(at.q0)));
+            (rate * self.stiffness, since)
         } else {
             (0.0, 0.0)
-        }
+        };
+        [(self.stiffness, wrap_angle(psi - self.rest)), damped]
+    }
+
+    /// Sum of stiffness times angle [N m], and of half of stiffness times its square [J].
+    fn moments(parts: &[(f64, f64); 2]) -> (f64, f64) {
+        let [(k, a), (c, b)] = parts;
+        (k * a + c * b, 0.5 * (k * a * a + c * b * b))
     }
 
     /// Elastic force's negative on `(q0, q1, wing)` of the triangle of wing `a` and of wing `b`: what each
@@ -204,68 +208,60 @@ impl Kernel<12> for Wrapping {
 
     fn value(&self, at: &Local<'_, 12>) -> f64 {
         let x = points(at.q);
-        let psi = self.angle(&x);
-        let delta = wrap_angle(psi - self.rest);
+        let (_, energy) = Self::moments(&self.parts(at, self.angle(&x)));
         let [a, b] = guards(&x, self.length_floor());
-        let (c, since) = self.damped(at, psi);
-        0.5 * (self.stiffness * delta * delta * a.value * b.value + c * since * since)
+        energy * a.value * b.value
     }
 
     fn gradient(&self, at: &Local<'_, 12>, out: &mut [f64; 12]) {
         let x = points(at.q);
-        let psi = self.angle(&x);
-        let delta = wrap_angle(psi - self.rest);
+        let (moment, energy) = Self::moments(&self.parts(at, self.angle(&x)));
         let guards = guards(&x, self.length_floor());
-        let (c, since) = self.damped(at, psi);
-        let moment = self.stiffness * delta * guards[0].value * guards[1].value + c * since;
-        let half = 0.5 * self.stiffness * delta * delta;
+        let moment = moment * guards[0].value * guards[1].value;
         let (g, w) = (self.angle_gradient(&x), guard_gradient(&guards));
         for p in 0..4 {
-            set_point(out, p, &(g[p] * moment + w[p] * half));
+            set_point(out, p, &(g[p] * moment + w[p] * energy));
         }
     }
 
     fn hessian(&self, at: &Local<'_, 12>, exactness: f64, out: &mut Lower<12>) {
         let x = points(at.q);
-        let psi = self.angle(&x);
-        let delta = wrap_angle(psi - self.rest);
+        let parts = self.parts(at, self.angle(&x));
+        let (moment, energy) = Self::moments(&parts);
         let guards = guards(&x, self.length_floor());
-        let (c, since) = self.damped(at, psi);
         let w = guards[0].value * guards[1].value;
         let psi_gradient = self.angle_gradient(&x);
         let (g, dw) = (
             flat(&psi_gradient, 1.0),
             flat(&guard_gradient(&guards), 1.0),
         );
-        let k = self.stiffness;
-        // square of the gradient of delta sqrt(w), which has no root in it
+        // square of the gradient of angle sqrt(w), which has no root in it
         let root = w.sqrt();
-        let by_root = if root > 1e-12 {
-            0.5 * delta / root
-        } else {
-            0.0
-        };
-        let mut measure = [0.0; 12];
-        for i in 0..12 {
-            measure[i] = root * g[i] + by_root * dw[i];
+        let over = if root > 1e-12 { 0.5 / root } else { 0.0 };
+        for (k, angle) in parts {
+            if k == 0.0 {
+                continue;
+            }
+            let mut measure = [0.0; 12];
+            for i in 0..12 {
+                measure[i] = root * g[i] + over * angle * dw[i];
+            }
+            add_square(out, k, &measure);
         }
-        add_square(out, k, &measure);
-        add_square(out, c, &g);
         if exactness == 0.0 {
             return;
         }
-        // what the square leaves out: k d2(delta^2 w / 2) - k measure^2
-        let e = exactness * k;
-        add_product(out, 0.5 * e * delta, &g, &dw);
-        add_square(out, -e * by_root * by_root, &dw);
+        // what the squares leave out: d2(k angle^2 w / 2) - k measure^2
+        add_product(out, 0.5 * exactness * moment, &g, &dw);
+        add_square(out, -2.0 * exactness * energy * over * over, &dw);
         let second = dihedral_hessian(&x, self.floor());
-        let moment = -self.sign * exactness * (k * delta * w + c * since);
+        let turned = -self.sign * exactness * moment * w;
         for p in 0..4 {
             for r in 0..=p {
-                add_block(out, p, r, &(second[p][r] * moment));
+                add_block(out, p, r, &(second[p][r] * turned));
             }
         }
-        add_guard_hessian(&guards, 0.5 * e * delta * delta, out);
+        add_guard_hessian(&guards, exactness * energy, out);
     }
 }
 
