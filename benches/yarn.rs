@@ -27,7 +27,7 @@ const H: f64 = 0.85 * W;
 const WARM: usize = 20;
 const COUNTED: usize = 50;
 /// Steps of the sweater.
-const FIRST: usize = 5;
+const FIRST: usize = 3;
 /// Loops in a row and a column of a square with as many as the sweater.
 const SWEATER: usize = 237;
 

@@ -704,11 +704,12 @@ typedef struct toile_suggest_desc {
      */
     size_t struct_size;
     /**
-     * Largest error of the deformation's gradient that is left to triangles, from 0.001; 0 (default) is none given.
+     * Error of the deformation's gradient above which triangles give way to yarns, from 0.001 to 1000: a root mean square over a vertex
+     * and what is around it, so that single vertices with more may stay. 0 (default) is none given.
      */
     double tolerance;
     /**
-     * Most nodes of yarns; 0 (default) is no limit.
+     * Most nodes of yarns as they are predicted; a region that is built may have a fifth more or less. 0 (default) is no limit.
      */
     uint64_t budget;
     /**

@@ -185,7 +185,7 @@ fn tighter_tolerances_give_larger_regions() {
     assert!(sizes.len() > 3, "{sizes:?}");
 }
 
-/// A budget is kept to, by the prediction and by the simulation that is built, and spent.
+/// A budget is kept to and spent by the prediction, and the simulation that is built is near that.
 #[test]
 fn budgets_are_kept_to_and_spent() {
     let sim = placed(|x, y| [x, y, 2e-3 * (x / SIDE).powi(3) * (PI * x / 8e-3).sin()]);
@@ -212,6 +212,33 @@ fn budgets_are_kept_to_and_spent() {
     // one that allows no piece of a region
     let none = suggested(&sim, &budget(10));
     assert!(none.regions.is_empty() && none.cost.yarn_nodes == 0);
+}
+
+/// A panel of a few triangles that lies flat is no hole of a region: it wants no yarns, whatever the tolerance and the budget.
+#[test]
+fn a_small_flat_panel_wants_no_yarns() {
+    let mut small = garment();
+    small.seams.clear();
+    for panel in &mut small.panels {
+        for vertex in &mut panel.vertices {
+            *vertex *= 0.1;
+        }
+    }
+    let sim = sim_with(&small, 1.0);
+    assert!(sim.triangles().len() < 24, "{}", sim.triangles().len());
+    for wish in [tolerance(1e-3), tolerance(1e3), budget(1)] {
+        let found = suggested(&sim, &wish);
+        assert!(found.regions.is_empty() && found.cost.yarn_nodes == 0);
+        assert!(found.tolerance <= 1e3);
+    }
+}
+
+/// Positions whose strains overflow are refused with the vertex.
+#[test]
+fn what_is_no_cloth_is_refused() {
+    let sim = placed(|x, y| [1e200 * x, 1e200 * y, 0.0]);
+    let error = sim.suggest_region(&tolerance(0.1)).unwrap_err();
+    assert!(error.message.contains("error at vertex"), "{error}");
 }
 
 /// The polygons of a suggestion make its region again, with rings, and `alpha` makes the polygons.

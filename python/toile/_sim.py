@@ -334,7 +334,8 @@ class Sim(_Owner):
     ) -> tuple[np.ndarray, Suggestion]:
         """Where yarns would change the answer, from the present state of triangles alone: `alpha` of each
         vertex, shape (vertices,), for :meth:`Garment.set_blend_vertices`, and what it leaves and costs. At least
-        one of `tolerance`, the largest error left to triangles, and `budget`, the most nodes of yarns."""
+        one of `tolerance`, the error around a vertex above which triangles give way, and `budget`, the most nodes
+        of yarns as predicted."""
         if not 0 <= budget < 2**64:
             raise ValueError(f"budget: {budget} must be from 0 to 2^64 - 1")
         desc = _ffi.new("toile_suggest_desc")

@@ -9,8 +9,8 @@
 //! unknowns = 3 (nodes that move + vertices with triangles of their own)
 //! ```
 //!
-//! The time of a drape is the power 1.8 of the unknowns, fitted to the mixed and whole models of three scenes (`docs/mixed.md`), from which
-//! they are up to three times away, and memory a line through the models of `examples/pucker.json`. Unknowns of sliding are left out: they come and go with the contacts that slide.
+//! The time of a drape is the power 1.8 of the unknowns, fitted to the mixed and whole drapes of `examples/pucker.json`, `sleeve.json` and `doll_skirt.json`, from which
+//! they are up to six times away, and memory a line through the models of `examples/pucker.json`. Unknowns of sliding are left out: they come and go with the contacts that slide.
 
 use crate::blend::Region;
 use crate::math::{Vec2, topology};

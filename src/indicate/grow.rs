@@ -97,7 +97,12 @@ impl<'a> Growth<'a> {
         }
         let bare: Vec<bool> = full.iter().map(|f| !f).collect();
         for hole in topology::pieces(&self.beside, &bare) {
-            if hole.len() < LARGEST_HOLE && hole.iter().all(|t| self.may[*t as usize]) {
+            // what borders on no yarns is no hole, however small
+            let inside = |t: &u32| self.beside[*t as usize].iter().any(|o| full[*o as usize]);
+            if hole.len() < LARGEST_HOLE
+                && hole.iter().all(|t| self.may[*t as usize])
+                && hole.iter().any(inside)
+            {
                 hole.iter().for_each(|t| full[*t as usize] = true);
             }
         }

@@ -26,9 +26,10 @@ pub const LARGEST_TOLERANCE: f64 = 1e3;
 /// What region is asked for: at least one of tolerance and budget.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Wish {
-    /// Largest error that is left to triangles; `None` is [`LEAST_TOLERANCE`], with a budget.
+    /// Error, as a root mean square around a vertex, above which triangles give way; `None` is [`LEAST_TOLERANCE`], with
+    /// a budget.
     pub tolerance: Option<f64>,
-    /// Most nodes of yarns; `None` is no limit.
+    /// Most nodes of yarns, as [`cost`] predicts them; `None` is no limit.
     pub budget: Option<u64>,
     /// Hybrid rings around the region.
     pub rings: u32,
@@ -58,7 +59,8 @@ pub struct Suggestion {
 }
 
 impl Wish {
-    fn check(&self) -> Result<f64> {
+    /// The tolerance; refuses what cannot be wished for.
+    pub fn check(&self) -> Result<f64> {
         if self.tolerance.is_none() && self.budget.is_none() {
             return Err(Error::argument(
                 "a region needs a tolerance or a budget of yarn nodes: neither is given",
@@ -98,6 +100,12 @@ pub fn suggest(
     }
     let may: Vec<bool> = mesh.triangle_panel.iter().map(|p| has_yarns(*p)).collect();
     let indicator = Indicator::new(garment, mesh, positions)?;
+    if let Some(v) = indicator.error.iter().position(|e| !e.is_finite()) {
+        return Err(Error::argument(format!(
+            "the error at vertex {v} is {}: its place or those beside it are no state of cloth",
+            indicator.error[v]
+        )));
+    }
     let growth = Growth::new(mesh, &indicator.error, may.clone());
     let predictor = Predictor::new(garment, mesh, cells);
     let at = |tolerance: f64| {
@@ -108,10 +116,9 @@ pub fn suggest(
     let mut tolerance = wanted;
     let (mut region, mut cost) = at(tolerance);
     if let Some(budget) = wish.budget.filter(|b| cost.yarn_nodes > *b) {
-        // regions shrink as the tolerance grows: the least level that keeps to the budget
+        // regions shrink as the tolerance grows, the last level's is empty: the least one that keeps to the budget
         let mut levels: Vec<f64> = growth.levels().filter(|l| *l > wanted).collect();
         levels.sort_unstable_by(f64::total_cmp);
-        levels.push(f64::MAX);
         let within = |l: &f64| at(*l).1.yarn_nodes <= budget;
         let first = levels.partition_point(|l| !within(l));
         tolerance = levels[first.min(levels.len() - 1)];

@@ -135,10 +135,10 @@ pub(crate) struct FabricArgs {
 pub(crate) struct SuggestArgs {
     #[command(flatten)]
     pub(crate) scene: SceneArgs,
-    /// Largest error of the deformation's gradient that is left to triangles, from 0.001; needed without a budget.
+    /// Error of the deformation's gradient, as a root mean square around a vertex, above which triangles give way to yarns, 0.001 to 1000; needed without a budget.
     #[arg(long, value_name = "T", required_unless_present = "budget")]
     pub(crate) tolerance: Option<f64>,
-    /// Most nodes of yarns.
+    /// Most nodes of yarns, as predicted.
     #[arg(long, value_name = "N")]
     pub(crate) budget: Option<u64>,
     /// Hybrid rings around the region, 0 to 3.

@@ -7,6 +7,7 @@ use crate::picture::upright;
 use crate::report::table;
 use serde_json::json;
 use std::fmt::Write;
+use toile::error::Error;
 use toile::indicate::cost::Cost;
 use toile::indicate::indicator::CRITERIA;
 use toile::indicate::{Suggestion, Wish};
@@ -15,7 +16,7 @@ use toile::pattern::Garment;
 use toile::readout::picture::render;
 use toile::readout::{Part, palette};
 use toile::scene::Scene;
-use toile::sim::{DrapeOptions, Sim};
+use toile::sim::{DrapeOptions, Outcome, Sim};
 use toile::sim_scene::build;
 
 pub(crate) fn suggest(args: &SuggestArgs) -> Done {
@@ -32,6 +33,13 @@ pub(crate) fn suggest(args: &SuggestArgs) -> Done {
         budget: args.budget,
         rings: args.rings,
     };
+    wish.check()?;
+    if args.compare && drawn.garment.blend_regions.is_empty() {
+        return Err(Error::argument(
+            "--compare compares with the garment's own regions; it has none",
+        )
+        .into());
+    }
     let mut sim = build(&scene)?;
     let mut text = String::new();
     if scene.run.drape {
@@ -40,7 +48,16 @@ pub(crate) fn suggest(args: &SuggestArgs) -> Done {
             max_steps: 0,
         };
         let report = sim.drape(&options, &mut |_| true)?;
-        let _ = writeln!(text, "drape of triangles: {}\n", report.outcome.name());
+        let _ = writeln!(text, "drape of triangles: {}", report.outcome.name());
+        if !report.reason.is_empty() {
+            let _ = writeln!(text, "{}", report.reason);
+        }
+        if report.outcome != Outcome::Converged {
+            text += "it has not come to rest: errors are of where it stopped\n";
+        }
+        text.push('\n');
+    } else {
+        text += "the scene asks for no drape: errors are of the garment as it is placed\n\n";
     }
     let found = sim.suggest_region(&wish)?;
     text += &criteria(&found);
