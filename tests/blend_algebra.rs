@@ -338,6 +338,19 @@ fn matrix(case: &Case, numbers: &mut Numbers) -> BlockMatrix {
     matrix
 }
 
+/// Such a matrix with the rows of `held` ring vertices, and of what never moves, as those of the identity; and which they are.
+fn held_matrix(case: &Case, held: usize, numbers: &mut Numbers) -> (BlockMatrix, Vec<bool>) {
+    let mut matrix = matrix(case, numbers);
+    let mut fixed: Vec<bool> = (0..case.points.count())
+        .map(|p| !case.points.moves(p))
+        .collect();
+    for v in case.filter().kept().iter().take(held) {
+        fixed[*v as usize] = true;
+    }
+    toile::system::assemble::fix_rows(&mut matrix, &fixed);
+    (matrix, fixed)
+}
+
 /// The constrained step by the solver, by the dense matrix with multipliers, and in the paper's filtered coordinates:
 /// equal to 1e-11, whatever vertices are held.
 #[test]
@@ -351,13 +364,8 @@ fn every_form_of_a_constrained_step_has_one_solution() {
         let case = case(side, edge, range, 1, means).expect("case");
         let filter = case.filter();
         let mut numbers = Numbers(23);
-        let mut matrix = matrix(&case, &mut numbers);
+        let (matrix, fixed) = held_matrix(&case, held, &mut numbers);
         let n = case.points.count();
-        let mut fixed: Vec<bool> = (0..n).map(|p| !case.points.moves(p)).collect();
-        for v in filter.kept().iter().take(held) {
-            fixed[*v as usize] = true;
-        }
-        toile::system::assemble::fix_rows(&mut matrix, &fixed);
         let b: Vec<Vec3> = (0..n)
             .map(|p| {
                 if fixed[p] {
@@ -476,13 +484,8 @@ fn filtered_conjugate_gradients_find_the_same_step() {
         let case = case(0.03, edge, [0.0095, 0.0205], 1, means).expect("case");
         let filter = case.joined.coupling.filter.as_ref().expect("filter");
         let mut numbers = Numbers(31);
-        let mut matrix = matrix(&case, &mut numbers);
+        let (matrix, fixed) = held_matrix(&case, held, &mut numbers);
         let n = case.points.count();
-        let mut fixed: Vec<bool> = (0..n).map(|p| !case.points.moves(p)).collect();
-        for v in filter.kept().iter().take(held) {
-            fixed[*v as usize] = true;
-        }
-        toile::system::assemble::fix_rows(&mut matrix, &fixed);
         let mut b = vec![Vec3::zeros(); n];
         for (b, _) in b.iter_mut().zip(&fixed).filter(|(_, fixed)| !**fixed) {
             *b = Vec3::from_fn(|_, _| numbers.next());

@@ -57,7 +57,8 @@ pub struct Tolerance {
     /// Whether a matrix that is not positive definite ends the solve instead of being made so by
     /// less of the exact Hessian.
     pub strict: bool,
-    /// Whether the few blocks that are worse than all others are solved for by themselves between corrections.
+    /// Whether the few blocks that are worse than all others are solved for by themselves, between corrections and where the
+    /// line search refuses a full one.
     pub settle: bool,
 }
 
