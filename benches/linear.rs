@@ -19,7 +19,6 @@ use toile::solve::linear::factored::SingleFactor;
 use toile::solve::linear::ic0::{IncompleteCholesky, Order, Storage};
 use toile::solve::linear::jacobi::BlockJacobi;
 use toile::solve::linear::pcg::ConjugateGradients;
-use toile::solve::linear::stiff_part::StiffPart;
 
 fn main() {
     let sizes: Vec<usize> = std::env::args().filter_map(|a| a.parse().ok()).collect();
@@ -52,9 +51,9 @@ fn main() {
                 ("cholesky", Box::new(Direct::new(&Workers::default()))),
                 (
                     "cg cholesky",
-                    Box::new(ConjugateGradients::new(Box::new(StiffPart::new(Box::new(
-                        SingleFactor::new(&Workers::default()),
-                    ))))),
+                    Box::new(ConjugateGradients::new(Box::new(SingleFactor::new(
+                        &Workers::default(),
+                    )))),
                 ),
                 (
                     "cg jacobi",

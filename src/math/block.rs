@@ -16,6 +16,16 @@ pub struct BlockPattern {
     pub rows: Vec<u32>,
 }
 
+impl Default for BlockPattern {
+    /// The pattern of no rows.
+    fn default() -> Self {
+        Self {
+            starts: vec![0],
+            rows: Vec::new(),
+        }
+    }
+}
+
 impl BlockPattern {
     /// Pattern of an `n` x `n` block matrix that couples the vertices of every stencil.
     /// `stencils` is called with a sink that takes one stencil (a list of block indices) a time.

@@ -281,13 +281,14 @@ impl Engine {
                 Motion::Relax { .. } => 1,
                 Motion::Rest { .. } => REST_ITERATIONS,
             },
-            // a relaxation takes one correction for each matrix: a rough one will do; and the directions of
-            // conjugate gradients on yarns are far better than their residuals
+            // a relaxation takes one correction for each matrix: a rough one will do. With yarns the directions of conjugate gradients
+            // are far better than their residuals; without rings it is the energy that ends an iteration
             linear: {
-                let rough = match dynamic {
-                    true if system.has_yarns() => 100.0,
-                    true => 1.0,
-                    false => 10.0,
+                let rough = match (&system.points.coupling.filter, dynamic) {
+                    (Some(_), true) => 100.0,
+                    (None, true) => 1.0,
+                    (None, false) if system.has_yarns() => 1.0,
+                    (_, false) => 10.0,
                 };
                 (rough * self.settings.linear_tolerance).min(0.1)
             },

@@ -16,9 +16,9 @@
 
 use super::LinearError;
 use super::substitution::Substitution;
-use crate::math::Vec3;
 use crate::math::block::{BlockMatrix, BlockPattern};
 use crate::math::parallel::Workers;
+use crate::math::{Mat3, Vec3};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
 use faer::sparse::linalg::SupernodalThreshold;
@@ -69,13 +69,13 @@ impl Number for f32 {
 pub(super) struct Cholesky<T> {
     pattern: BlockPattern,
     /// New place of each block row.
-    place: Vec<usize>,
+    place: Vec<u32>,
     /// `2 * slot + transposed` of the blocks of the permuted lower triangle, column by column.
-    source: Vec<usize>,
+    source: Vec<u32>,
     /// Start of each permuted block column in `source`.
-    starts: Vec<usize>,
-    lower: SymbolicSparseColMat<usize>,
-    symbolic: SymbolicCholesky<usize>,
+    starts: Vec<u32>,
+    lower: SymbolicSparseColMat<u32>,
+    symbolic: SymbolicCholesky<u32>,
     values: Vec<T>,
     factor: Vec<T>,
     rhs: Vec<T>,
@@ -103,6 +103,10 @@ impl<T: Number> Cholesky<T> {
     /// Analysis of a pattern.
     fn new(pattern: &BlockPattern) -> Result<Self, LinearError> {
         let n = pattern.n();
+        // faer counts with the same 32 bits and refuses a factor that has more numbers
+        if 9 * pattern.rows.len() > u32::MAX as usize {
+            return Err(LinearError::NoConvergence);
+        }
         let place = minimum_degree(pattern)?;
 
         // Permuted block columns of the lower triangle: (column, row, source), sorted.
@@ -111,13 +115,13 @@ impl<T: Number> Cholesky<T> {
             for k in pattern.starts[j] as usize..pattern.starts[j + 1] as usize {
                 let (p, q) = (place[pattern.rows[k] as usize], place[j]);
                 let transposed = p < q;
-                entries.push((p.min(q), p.max(q), 2 * k + usize::from(transposed)));
+                entries.push((p.min(q), p.max(q), 2 * k as u32 + u32::from(transposed)));
             }
         }
         entries.sort_unstable();
-        let mut starts = vec![0; n + 1];
+        let mut starts = vec![0_u32; n + 1];
         for &(column, _, _) in &entries {
-            starts[column + 1] += 1;
+            starts[column as usize + 1] += 1;
         }
         for j in 0..n {
             starts[j + 1] += starts[j];
@@ -155,19 +159,27 @@ impl<T: Number> Cholesky<T> {
 
     /// Factors a matrix of the pattern.
     pub(super) fn prepare(&mut self, matrix: &BlockMatrix) -> Result<(), LinearError> {
-        self.load(matrix)?;
+        self.prepare_blocks(|slot| matrix.blocks[slot])
+    }
+
+    /// The same with the blocks of the pattern by their slots.
+    pub(super) fn prepare_blocks(
+        &mut self,
+        block: impl Fn(usize) -> Mat3,
+    ) -> Result<(), LinearError> {
+        self.load(block)?;
         self.factorize()
     }
 
     /// Copies the blocks into permuted scalar columns; refuses what is not finite.
-    fn load(&mut self, matrix: &BlockMatrix) -> Result<(), LinearError> {
+    fn load(&mut self, block: impl Fn(usize) -> Mat3) -> Result<(), LinearError> {
         let mut poison = 0.0;
         let mut at = 0;
         for j in 0..self.place.len() {
-            let blocks = &self.source[self.starts[j]..self.starts[j + 1]];
+            let blocks = &self.source[self.starts[j] as usize..self.starts[j + 1] as usize];
             for c in 0..3 {
                 for (k, &source) in blocks.iter().enumerate() {
-                    let block = &matrix.blocks[source >> 1];
+                    let block = block(source as usize >> 1);
                     // The diagonal block comes first in its column and gives its lower part.
                     for r in if k == 0 { c } else { 0 }..3 {
                         let value = if source & 1 == 1 {
@@ -216,7 +228,7 @@ impl<T: Number> Cholesky<T> {
             let block = node.val();
             for c in 0..block.ncols() {
                 let root: f64 = block[(c, c)].into();
-                let diagonal: f64 = self.values[columns[node.start() + c]].into();
+                let diagonal: f64 = self.values[columns[node.start() + c] as usize].into();
                 let pivot = root * root;
                 if pivot.is_nan() || pivot <= 64.0 * T::EPSILON * diagonal {
                     return Err(LinearError::NotPositiveDefinite);
@@ -238,7 +250,7 @@ impl<T: Number> Cholesky<T> {
         }
         for (b, &p) in b.iter().zip(&self.place) {
             for c in 0..3 {
-                self.rhs[3 * p + c] = T::of(b[c]);
+                self.rhs[3 * p as usize + c] = T::of(b[c]);
             }
         }
         self.substitution.solve(
@@ -248,7 +260,7 @@ impl<T: Number> Cholesky<T> {
             workers,
         );
         for (x, &p) in x.iter_mut().zip(&self.place) {
-            *x = Vec3::from_fn(|c, _| self.rhs[3 * p + c].into());
+            *x = Vec3::from_fn(|c, _| self.rhs[3 * p as usize + c].into());
             if !x.iter().all(|v| v.is_finite()) {
                 return Err(LinearError::NoConvergence);
             }
@@ -263,7 +275,7 @@ impl<T: Number> Cholesky<T> {
     {
         let n = 3 * self.place.len();
         let mut permuted = Mat::<T>::zeros(n, right.len());
-        let place = |i: usize| 3 * self.place[i / 3] + i % 3;
+        let place = |i: usize| 3 * self.place[i / 3] as usize + i % 3;
         for (k, column) in right.iter().enumerate() {
             for (i, value) in column {
                 permuted[(place(*i as usize), k)] = T::of(*value);
@@ -305,8 +317,7 @@ impl<T: Number> Cholesky<T> {
             SymbolicCholeskyRaw::Simplicial(s) => s.row_idx().len() + s.nrows(),
         };
         size_of::<T>() * numbers
-            + 8 * (indices + symbolic)
-            + 4 * (self.pattern.rows.len() + self.pattern.starts.len())
+            + 4 * (indices + symbolic + self.pattern.rows.len() + self.pattern.starts.len())
             + self.work_bytes
             + self.substitution.bytes()
     }
@@ -314,8 +325,8 @@ impl<T: Number> Cholesky<T> {
 
 /// The supernodal analysis, the only kind that is asked for.
 pub(super) fn supernodal(
-    symbolic: &SymbolicCholesky<usize>,
-) -> Result<&supernodal::SymbolicSupernodalCholesky<usize>, LinearError> {
+    symbolic: &SymbolicCholesky<u32>,
+) -> Result<&supernodal::SymbolicSupernodalCholesky<u32>, LinearError> {
     match symbolic.raw() {
         SymbolicCholeskyRaw::Supernodal(symbolic) => Ok(symbolic),
         SymbolicCholeskyRaw::Simplicial(_) => Err(LinearError::NoConvergence),
@@ -323,14 +334,12 @@ pub(super) fn supernodal(
 }
 
 /// New place of each block row under approximate minimum degree.
-fn minimum_degree(pattern: &BlockPattern) -> Result<Vec<usize>, LinearError> {
+fn minimum_degree(pattern: &BlockPattern) -> Result<Vec<u32>, LinearError> {
     let n = pattern.n();
-    let starts: Vec<usize> = pattern.starts.iter().map(|&s| s as usize).collect();
-    let rows: Vec<usize> = pattern.rows.iter().map(|&r| r as usize).collect();
-    let graph = SymbolicSparseColMatRef::new_checked(n, n, &starts, None, &rows);
-    let mut old = vec![0_usize; n];
-    let mut place = vec![0_usize; n];
-    let mut memory = MemBuffer::try_new(amd::order_scratch::<usize>(n, rows.len()))
+    let graph = SymbolicSparseColMatRef::new_checked(n, n, &pattern.starts, None, &pattern.rows);
+    let mut old = vec![0_u32; n];
+    let mut place = vec![0_u32; n];
+    let mut memory = MemBuffer::try_new(amd::order_scratch::<u32>(n, pattern.rows.len()))
         .map_err(|_| LinearError::NoConvergence)?;
     amd::order(
         &mut old,
@@ -346,30 +355,31 @@ fn minimum_degree(pattern: &BlockPattern) -> Result<Vec<usize>, LinearError> {
 /// Scalar columns of the lower triangle from sorted block entries `(column, row, _)`.
 fn scalar_lower(
     n: usize,
-    starts: &[usize],
-    entries: &[(usize, usize, usize)],
-) -> SymbolicSparseColMat<usize> {
+    starts: &[u32],
+    entries: &[(u32, u32, u32)],
+) -> SymbolicSparseColMat<u32> {
     let mut column_starts = Vec::with_capacity(3 * n + 1);
     let mut rows = Vec::with_capacity(9 * entries.len());
     column_starts.push(0);
     for j in 0..n {
         for c in 0..3 {
-            for &(column, row, _) in &entries[starts[j]..starts[j + 1]] {
+            for &(column, row, _) in &entries[starts[j] as usize..starts[j + 1] as usize] {
                 let first = if row == column { c } else { 0 };
                 rows.extend((first..3).map(|r| 3 * row + r));
             }
-            column_starts.push(rows.len());
+            column_starts.push(rows.len() as u32);
         }
     }
+    rows.shrink_to_fit();
     SymbolicSparseColMat::new_checked(3 * n, 3 * n, column_starts, None, rows)
 }
 
 /// Scalar columns of the upper triangle (what the symbolic analysis reads) from the same entries.
-fn scalar_upper(n: usize, entries: &[(usize, usize, usize)]) -> (Vec<usize>, Vec<usize>) {
+fn scalar_upper(n: usize, entries: &[(u32, u32, u32)]) -> (Vec<u32>, Vec<u32>) {
     // Sorted by (column, row) of the lower triangle, so each upper column fills in row order.
-    let mut counts = vec![0; n + 1];
+    let mut counts = vec![0_usize; n + 1];
     for &(_, row, _) in entries {
-        counts[row + 1] += 1;
+        counts[row as usize + 1] += 1;
     }
     for j in 0..n {
         counts[j + 1] += counts[j];
@@ -377,8 +387,8 @@ fn scalar_upper(n: usize, entries: &[(usize, usize, usize)]) -> (Vec<usize>, Vec
     let mut block_rows = vec![0; entries.len()];
     let mut next = counts.clone();
     for &(column, row, _) in entries {
-        block_rows[next[row]] = column;
-        next[row] += 1;
+        block_rows[next[row as usize]] = column;
+        next[row as usize] += 1;
     }
     let mut column_starts = Vec::with_capacity(3 * n + 1);
     let mut rows = Vec::with_capacity(9 * entries.len());
@@ -386,10 +396,10 @@ fn scalar_upper(n: usize, entries: &[(usize, usize, usize)]) -> (Vec<usize>, Vec
     for j in 0..n {
         for c in 0..3 {
             for &i in &block_rows[counts[j]..counts[j + 1]] {
-                let last = if i == j { c } else { 2 };
+                let last = if i as usize == j { c } else { 2 };
                 rows.extend((0..=last).map(|r| 3 * i + r));
             }
-            column_starts.push(rows.len());
+            column_starts.push(rows.len() as u32);
         }
     }
     (column_starts, rows)

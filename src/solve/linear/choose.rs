@@ -20,10 +20,10 @@
 //! itself: two steps of 1/60 s took 6.8 CPU seconds with IC(0) alone, 2.2 with kept factors.
 //!
 //! Yarns, whose stretch is 1e4 times as stiff as their bending, have a `rho` of 1e5 at 1 ms. Incomplete factors take hundreds of
-//! iterations there; in motion large systems of yarns get factors of overlapping parts
-//! ([`super::schwarz`]), and every matrix of small ones is factored as a whole. In a hanging swatch of 16 772
-//! nodes at 1 ms a correction takes 30 us a node by parts and 50 to 56 by factors of the whole, on one thread; at
-//! 4 292 nodes they take the same.
+//! iterations there: kept factors serve motion and rest, and every matrix of small systems is factored as it is. In a hanging swatch of 16 772
+//! nodes a step of 1 ms takes 106 us a node by kept factors and 213 by those of overlapping parts
+//! ([`super::schwarz`]), both with the same error, and 5.9 KB a node against 26; at 4 292 nodes 100, 150 to 210, and exact factors 190, on
+//! one thread.
 //!
 //! `rho` is read off the matrix: internal stiffness has zero row sums, so what a row's blocks sum
 //! to is its mass term, and `rho` is the median over vertices of trace(diagonal block) over
@@ -39,7 +39,6 @@ use super::ic0::{IncompleteCholesky, Order, Storage};
 use super::jacobi::BlockJacobi;
 use super::pcg::ConjugateGradients;
 use super::schwarz::Schwarz;
-use super::stiff_part::StiffPart;
 use super::{LinearError, LinearSolver};
 use crate::blend::Filter;
 use crate::math::block::BlockMatrix;
@@ -47,22 +46,25 @@ use crate::math::parallel::Workers;
 use crate::math::{Mat3, Vec3};
 use std::sync::Arc;
 
-/// Stiffness over mass below which incomplete factors are enough.
+/// Stiffness over mass below which incomplete factors are enough for triangles.
 const CROSSOVER_RATIO: f64 = 2e4;
 
 /// Iterations of conjugate gradients beyond which incomplete factors are not enough.
 const MANY: u32 = 50;
 
-/// The same of yarns, below which factors of parts are enough; 10 ms of a hanging knit are below.
-const CROSSOVER_RATIO_YARNS: f64 = 1e7;
+/// Stiffness over mass of yarns in motion; 10 ms of a hanging knit are below.
+const MOVING_YARNS: f64 = 1e7;
 
 /// Blocks below which every matrix is factored: for triangles such a factor takes about a millisecond.
 const ALWAYS_DIRECT: usize = 300;
 /// The same of a system with yarns, in motion and in all else.
-const ALWAYS_DIRECT_YARNS: [usize; 2] = [8_000, 20_000];
+const ALWAYS_DIRECT_YARNS: [usize; 2] = [3_000, 20_000];
 
-/// Iterations up to which factors are kept for the next matrix: of the whole, which are costly, and of parts.
-const KEPT: [u32; 2] = [15, 4];
+/// Iterations up to which a factor is kept for the next matrix. A new one costs triangles that many, yarns, whose every iteration
+/// is dear, a few.
+const KEPT: u32 = 15;
+/// The same of yarns, and of the factors of parts.
+const KEPT_YARNS: [u32; 2] = [6, 4];
 
 /// What a system is made of, as far as its matrices show it.
 #[derive(Clone, Copy)]
@@ -83,7 +85,7 @@ pub fn solver(kind: u32, n: usize, made: Made<'_>, workers: &Workers) -> Box<dyn
         1 => Box::new(Direct::new(workers)),
         2 => Box::new(ConjugateGradients::new(Box::new(BlockJacobi::new()))),
         3 => Box::new(incomplete(made)),
-        4 => Box::new(factored(workers)),
+        4 => Box::new(factored(made, workers)),
         5 => Box::new(parted(workers)),
         _ if n < ALWAYS_DIRECT => Box::new(Direct::new(workers)),
         _ => Box::new(Automatic::new(made, workers)),
@@ -103,16 +105,25 @@ pub fn filtered(kind: u32, filter: &Arc<Filter>, workers: &Workers) -> Box<dyn L
     let levels = Box::new(Filtered::new(filter, beside, true, workers));
     let cg = ConjugateGradients::new(levels);
     // diagonal blocks are cheap to make and take too many iterations to end early
-    Box::new(if costly { cg.for_newton(KEPT[1]) } else { cg })
+    Box::new(if costly {
+        cg.for_newton(KEPT_YARNS[1])
+    } else {
+        cg
+    })
 }
 
-fn factored(workers: &Workers) -> ConjugateGradients {
-    let factor = Box::new(SingleFactor::new(workers));
-    ConjugateGradients::new(Box::new(StiffPart::new(factor))).for_newton(KEPT[0])
+fn factored(made: Made<'_>, workers: &Workers) -> ConjugateGradients {
+    let cg = ConjugateGradients::new(Box::new(SingleFactor::new(workers)));
+    match made {
+        Made::Triangles(_) => cg.for_newton(KEPT),
+        Made::Yarns => cg.for_newton(KEPT_YARNS[0]).in_energy(),
+    }
 }
 
 fn parted(workers: &Workers) -> ConjugateGradients {
-    ConjugateGradients::new(Box::new(Schwarz::new(workers))).for_newton(KEPT[1])
+    ConjugateGradients::new(Box::new(Schwarz::new(workers)))
+        .for_newton(KEPT_YARNS[1])
+        .in_energy()
 }
 
 fn incomplete(made: Made<'_>) -> ConjugateGradients {
@@ -127,9 +138,8 @@ fn incomplete(made: Made<'_>) -> ConjugateGradients {
 /// Chooses for each matrix; what the others refuse is solved directly.
 pub struct Automatic {
     direct: Direct,
-    yarns: bool,
-    /// For matrices in which inertia has a say.
-    near: ConjugateGradients,
+    /// For matrices of triangles in which inertia has a say.
+    near: Option<ConjugateGradients>,
     factored: ConjugateGradients,
     chosen: Choice,
     /// Whether `near` was not enough for a matrix since the last `forget`.
@@ -148,16 +158,11 @@ enum Choice {
 impl Automatic {
     /// For what a system is made of.
     pub fn new(made: Made<'_>, workers: &Workers) -> Self {
-        let yarns = matches!(made, Made::Yarns);
+        let triangles = matches!(made, Made::Triangles(_));
         Self {
             direct: Direct::new(workers),
-            yarns,
-            near: if yarns {
-                parted(workers)
-            } else {
-                incomplete(made)
-            },
-            factored: factored(workers),
+            near: triangles.then(|| incomplete(made)),
+            factored: factored(made, workers),
             chosen: Choice::Direct,
             slow: false,
             ratios: Vec::new(),
@@ -166,11 +171,28 @@ impl Automatic {
     }
 
     fn chosen(&self) -> &dyn LinearSolver {
-        match self.chosen {
-            Choice::Direct => &self.direct,
-            Choice::Near => &self.near,
-            Choice::Factored => &self.factored,
+        match (self.chosen, &self.near) {
+            (Choice::Near, Some(near)) => near,
+            (Choice::Factored, _) => &self.factored,
+            _ => &self.direct,
         }
+    }
+
+    /// The solver for matrices in which inertia has a say, if it is for this one.
+    fn nearby(&mut self, matrix: &BlockMatrix) -> Option<&mut ConjugateGradients> {
+        if self.slow || self.near.is_none() || self.stiffness_ratio(matrix) >= CROSSOVER_RATIO {
+            return None;
+        }
+        self.near.as_mut()
+    }
+
+    /// Whether a matrix is factored as it is.
+    fn is_small(&mut self, matrix: &BlockMatrix) -> bool {
+        // yarns begin and cease to slide: their blocks are counted in each matrix
+        if self.near.is_some() || matrix.n() >= ALWAYS_DIRECT_YARNS[1] {
+            return false;
+        }
+        matrix.n() < ALWAYS_DIRECT_YARNS[0] || self.stiffness_ratio(matrix) >= MOVING_YARNS
     }
 
     /// Median of stiffness over mass; infinite where the rows sum to nothing (statics).
@@ -209,33 +231,24 @@ impl LinearSolver for Automatic {
     }
 
     fn forget(&mut self) {
-        self.near.forget();
+        if let Some(near) = &mut self.near {
+            near.forget();
+        }
         self.factored.forget();
         self.chosen = Choice::Direct;
         self.slow = false;
     }
 
     fn prepare(&mut self, matrix: &BlockMatrix) -> Result<(), LinearError> {
-        // yarns begin and cease to slide: their blocks are counted in each matrix
-        let direct = ALWAYS_DIRECT_YARNS.map(|least| self.yarns && matrix.n() < least);
-        let crossover = if self.yarns {
-            CROSSOVER_RATIO_YARNS
-        } else {
-            CROSSOVER_RATIO
-        };
-        if !direct[0] && !self.slow && self.stiffness_ratio(matrix) < crossover {
+        if let Some(near) = self.nearby(matrix)
+            && near.prepare(matrix).is_ok()
+        {
             self.chosen = Choice::Near;
-            match self.near.prepare(matrix) {
-                Ok(()) => return Ok(()),
-                // a part that is not positive definite tells of the whole, an incomplete factor does not
-                Err(LinearError::NotPositiveDefinite) if self.yarns => {
-                    return Err(LinearError::NotPositiveDefinite);
-                }
-                Err(_) => {}
-            }
+            return Ok(());
         }
         self.chosen = Choice::Factored;
-        if !direct[1] && self.factored.prepare(matrix).is_ok() {
+        if !self.is_small(matrix) && self.factored.prepare(matrix).is_ok() {
+            self.direct.drop_factor();
             return Ok(());
         }
         self.chosen = Choice::Direct;
@@ -249,10 +262,10 @@ impl LinearSolver for Automatic {
         x: &mut [Vec3],
         tolerance: f64,
     ) -> Result<u32, LinearError> {
-        let solved = match self.chosen {
-            Choice::Direct => return self.direct.solve(matrix, b, x, tolerance),
-            Choice::Near => self.near.solve(matrix, b, x, tolerance),
-            Choice::Factored => self.factored.solve(matrix, b, x, tolerance),
+        let solved = match (self.chosen, &mut self.near) {
+            (Choice::Near, Some(near)) => near.solve(matrix, b, x, tolerance),
+            (Choice::Factored, _) => self.factored.solve(matrix, b, x, tolerance),
+            _ => return self.direct.solve(matrix, b, x, tolerance),
         };
         if self.chosen == Choice::Near {
             self.slow = !solved.as_ref().is_ok_and(|&count| count <= MANY);
@@ -269,7 +282,7 @@ impl LinearSolver for Automatic {
 
     fn bytes(&self) -> usize {
         self.direct.bytes()
-            + self.near.bytes()
+            + self.near.as_ref().map_or(0, LinearSolver::bytes)
             + self.factored.bytes()
             + 8 * self.ratios.len()
             + size_of::<Mat3>() * self.sums.len()

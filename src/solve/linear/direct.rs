@@ -27,6 +27,12 @@ impl Direct {
         }
     }
 
+    /// Gives the memory of the factor back.
+    pub(super) fn drop_factor(&mut self) {
+        self.cholesky = None;
+        self.factored = false;
+    }
+
     /// Stored numbers of the factor, padding of supernodes included; 0 before the first matrix.
     pub fn factor_length(&self) -> usize {
         self.cholesky.as_ref().map_or(0, Cholesky::factor_length)

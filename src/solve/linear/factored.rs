@@ -1,4 +1,4 @@
-//! The factor of an earlier matrix as a preconditioner: sparse Cholesky in f32.
+//! The factor of the [`stiff_part`](super::stiff_part) of an earlier matrix as a preconditioner: sparse Cholesky in f32.
 //!
 //! Newton's method meets a series of matrices that change little. Conjugate gradients with the
 //! factor of an earlier one need a handful of iterations, each at a tenth of the price of a new
@@ -7,6 +7,7 @@
 use super::LinearError;
 use super::cholesky::Cholesky;
 use super::pcg::Preconditioner;
+use super::stiff_part::StiffPart;
 use crate::math::Vec3;
 use crate::math::block::BlockMatrix;
 use crate::math::parallel::Workers;
@@ -14,6 +15,7 @@ use crate::math::parallel::Workers;
 /// Cholesky factor in f32.
 #[derive(Default)]
 pub struct SingleFactor {
+    stiff: StiffPart,
     cholesky: Option<Cholesky<f32>>,
     workers: Workers,
 }
@@ -22,8 +24,8 @@ impl SingleFactor {
     /// A preconditioner that has seen no matrix yet.
     pub fn new(workers: &Workers) -> Self {
         Self {
-            cholesky: None,
             workers: workers.clone(),
+            ..Self::default()
         }
     }
 }
@@ -34,7 +36,13 @@ impl Preconditioner for SingleFactor {
     }
 
     fn prepare(&mut self, matrix: &BlockMatrix) -> Result<(), LinearError> {
-        Cholesky::for_pattern(&mut self.cholesky, &matrix.pattern)?.prepare(matrix)
+        self.stiff.take(matrix);
+        Cholesky::for_pattern(&mut self.cholesky, self.stiff.pattern())?
+            .prepare_blocks(|slot| self.stiff.block(matrix, slot))
+    }
+
+    fn forget(&mut self) {
+        self.stiff.forget();
     }
 
     fn apply(&mut self, r: &[Vec3], z: &mut [Vec3]) {
@@ -49,6 +57,6 @@ impl Preconditioner for SingleFactor {
     }
 
     fn bytes(&self) -> usize {
-        self.cholesky.as_ref().map_or(0, Cholesky::bytes)
+        self.stiff.bytes() + self.cholesky.as_ref().map_or(0, Cholesky::bytes)
     }
 }

@@ -3,7 +3,7 @@
 //! * [`direct`]: supernodal Cholesky, ordered by approximate minimum degree on the block graph.
 //! * [`pcg`]: conjugate gradients with a [`pcg::Preconditioner`]: [`jacobi`] (3x3 diagonal blocks),
 //!   [`ic0`] (incomplete Cholesky on the pattern of `A`, in an [`ordering`]), [`factored`] (the
-//!   complete factor of an earlier matrix, of its [`stiff_part`]) or [`schwarz`] (factors of overlapping parts of the [`graph`]).
+//!   complete factor of an earlier matrix, of its stiff part) or [`schwarz`] (factors of overlapping parts of the [`graph`]).
 //! * [`constrained`]: the same with linear constraints between the unknowns, of blended rings;
 //!   [`filtered`] is a preconditioner under these.
 //! * [`choose`]: which of them, by number or by measured crossover.
@@ -20,7 +20,7 @@ pub mod jacobi;
 pub mod ordering;
 pub mod pcg;
 pub mod schwarz;
-pub mod stiff_part;
+mod stiff_part;
 mod substitution;
 
 use crate::math::Vec3;

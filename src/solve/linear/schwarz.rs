@@ -45,7 +45,7 @@ struct Part {
     rows: Vec<u32>,
     /// Where each of its blocks is in the whole matrix.
     source: Vec<u32>,
-    matrix: BlockMatrix,
+    pattern: BlockPattern,
     single: Option<Cholesky<f32>>,
     double: Option<Cholesky<f64>>,
     right: Vec<Vec3>,
@@ -149,7 +149,7 @@ impl Part {
         Self {
             rows,
             source,
-            matrix: BlockMatrix::zeros(pattern),
+            pattern,
             single: None,
             double: None,
             right: zeros.clone(),
@@ -159,15 +159,14 @@ impl Part {
     }
 
     fn prepare(&mut self, whole: &BlockMatrix) -> Result<(), LinearError> {
-        for (block, source) in self.matrix.blocks.iter_mut().zip(&self.source) {
-            *block = whole.blocks[*source as usize];
-        }
-        let single = Cholesky::for_pattern(&mut self.single, &self.matrix.pattern)?;
-        if single.prepare(&self.matrix).is_ok() {
+        let block = |slot: usize| whole.blocks[self.source[slot] as usize];
+        let single = Cholesky::for_pattern(&mut self.single, &self.pattern)?;
+        if single.prepare_blocks(block).is_ok() {
             self.double = None;
             return Ok(());
         }
-        Cholesky::for_pattern(&mut self.double, &self.matrix.pattern)?.prepare(&self.matrix)
+        self.single = None;
+        Cholesky::for_pattern(&mut self.double, &self.pattern)?.prepare_blocks(block)
     }
 
     fn solve(&mut self, r: &[Vec3]) -> Result<(), LinearError> {
@@ -185,8 +184,7 @@ impl Part {
     }
 
     fn bytes(&self) -> usize {
-        size_of_val(&self.matrix.blocks[..])
-            + 4 * (self.rows.len() + 2 * self.source.len())
+        4 * (2 * self.rows.len() + 2 * self.source.len())
             + 48 * self.rows.len()
             + self.single.as_ref().map_or(0, Cholesky::bytes)
             + self.double.as_ref().map_or(0, Cholesky::bytes)

@@ -6,35 +6,64 @@
 //! `|2 x . B y| <= |B| (|x|^2 + |y|^2)`. A factor then has the fill of the membrane alone. Which
 //! blocks are kept is decided once for a pattern.
 
-use super::LinearError;
-use super::pcg::Preconditioner;
+use crate::math::Mat3;
 use crate::math::block::{BlockMatrix, BlockPattern};
-use crate::math::{Mat3, Vec3};
 
 /// Part of the diagonal blocks below which a coupling is left out.
 const DROPPED: f64 = 3e-3;
-/// Mark of a block that is left out.
-const NOWHERE: u32 = u32::MAX;
-
-/// A preconditioner of the stiff part.
-pub struct StiffPart {
-    inner: Box<dyn Preconditioner>,
-    /// Pattern of the whole matrix that `slots` is for.
-    pattern: Option<BlockPattern>,
-    /// Where each of its blocks goes in `stiff`.
-    slots: Vec<u32>,
-    stiff: BlockMatrix,
+/// Which blocks of a matrix are kept, and what is added to its diagonals for the others.
+#[derive(Default)]
+pub(super) struct StiffPart {
+    /// Pattern of the whole matrix.
+    whole: BlockPattern,
+    /// Pattern of the part.
+    pattern: BlockPattern,
+    /// Slots in the whole matrix of its blocks.
+    kept: Vec<u32>,
+    /// Slots of the blocks that are left out.
+    left: Vec<u32>,
+    /// What each block row has on its diagonal for them.
+    lumps: Vec<f64>,
 }
 
 impl StiffPart {
-    /// What `inner` makes of the stiff part.
-    pub fn new(inner: Box<dyn Preconditioner>) -> Self {
-        Self {
-            inner,
-            pattern: None,
-            slots: Vec::new(),
-            stiff: BlockMatrix::zeros(BlockPattern::from_stencils(0, |_| {})),
+    /// The part of a matrix whose pattern may have changed.
+    pub(super) fn take(&mut self, matrix: &BlockMatrix) {
+        if self.whole != matrix.pattern {
+            self.select(matrix);
         }
+        self.lumps.fill(0.0);
+        let mut column = 0;
+        for slot in &self.left {
+            while matrix.pattern.starts[column + 1] <= *slot {
+                column += 1;
+            }
+            let lump = bound(&matrix.blocks[*slot as usize]);
+            self.lumps[column] += lump;
+            self.lumps[matrix.pattern.rows[*slot as usize] as usize] += lump;
+        }
+    }
+
+    /// Forgets which blocks were kept.
+    pub(super) fn forget(&mut self) {
+        *self = Self::default();
+    }
+
+    /// Pattern of the part.
+    pub(super) fn pattern(&self) -> &BlockPattern {
+        &self.pattern
+    }
+
+    /// A block of the part of the matrix last taken, by its slot.
+    pub(super) fn block(&self, matrix: &BlockMatrix, slot: usize) -> Mat3 {
+        let source = self.kept[slot] as usize;
+        let block = matrix.blocks[source];
+        let row = self.pattern.rows[slot] as usize;
+        // the diagonal block comes first in its column
+        if self.pattern.starts[row] as usize == slot {
+            return block + Mat3::from_diagonal_element(self.lumps[row]);
+        }
+        block
     }
 
     /// Decides which blocks of a matrix are kept.
@@ -45,23 +74,31 @@ impl StiffPart {
             .map(|j| matrix.blocks[pattern.starts[j] as usize].norm())
             .collect();
         let (mut starts, mut rows) = (Vec::with_capacity(n + 1), Vec::new());
-        self.slots.clear();
+        self.kept.clear();
+        self.left.clear();
         starts.push(0);
         for j in 0..n {
-            for k in pattern.starts[j] as usize..pattern.starts[j + 1] as usize {
-                let i = pattern.rows[k] as usize;
+            for k in pattern.starts[j]..pattern.starts[j + 1] {
+                let i = pattern.rows[k as usize] as usize;
                 let limit = DROPPED * (diagonal[i] * diagonal[j]).sqrt();
-                if i == j || matrix.blocks[k].norm() >= limit {
-                    self.slots.push(rows.len() as u32);
+                if i == j || matrix.blocks[k as usize].norm() >= limit {
+                    self.kept.push(k);
                     rows.push(i as u32);
                 } else {
-                    self.slots.push(NOWHERE);
+                    self.left.push(k);
                 }
             }
             starts.push(rows.len() as u32);
         }
-        self.stiff = BlockMatrix::zeros(BlockPattern { starts, rows });
-        self.pattern = Some(pattern.clone());
+        self.lumps.resize(n, 0.0);
+        self.pattern = BlockPattern { starts, rows };
+        self.whole = pattern.clone();
+    }
+
+    /// Bytes held.
+    pub(super) fn bytes(&self) -> usize {
+        let patterns = [&self.whole, &self.pattern].map(|p| p.rows.len() + p.starts.len());
+        4 * (patterns[0] + patterns[1] + self.kept.len() + self.left.len()) + 8 * self.lumps.len()
     }
 }
 
@@ -71,54 +108,4 @@ fn bound(block: &Mat3) -> f64 {
     block
         .norm()
         .min((sums(block) * sums(&block.transpose())).sqrt())
-}
-
-impl Preconditioner for StiffPart {
-    fn solver_name(&self) -> &'static str {
-        self.inner.solver_name()
-    }
-
-    fn prepare(&mut self, matrix: &BlockMatrix) -> Result<(), LinearError> {
-        if self.pattern.as_ref() != Some(&matrix.pattern) {
-            self.select(matrix);
-        }
-        let pattern = &matrix.pattern;
-        for block in &mut self.stiff.blocks {
-            block.fill(0.0);
-        }
-        for j in 0..pattern.n() {
-            for k in pattern.starts[j] as usize..pattern.starts[j + 1] as usize {
-                let block = &matrix.blocks[k];
-                if self.slots[k] == NOWHERE {
-                    let lump = Mat3::from_diagonal_element(bound(block));
-                    let i = pattern.rows[k] as usize;
-                    for v in [i, j] {
-                        self.stiff.blocks[self.stiff.pattern.starts[v] as usize] += lump;
-                    }
-                } else {
-                    self.stiff.blocks[self.slots[k] as usize] += block;
-                }
-            }
-        }
-        self.inner.prepare(&self.stiff)
-    }
-
-    fn forget(&mut self) {
-        self.pattern = None;
-        self.inner.forget();
-    }
-
-    fn apply(&mut self, r: &[Vec3], z: &mut [Vec3]) {
-        self.inner.apply(r, z);
-    }
-
-    fn bytes(&self) -> usize {
-        let pattern = self
-            .pattern
-            .as_ref()
-            .map_or(0, |p| p.rows.len() + p.starts.len());
-        4 * (pattern + self.slots.len() + self.stiff.pattern.rows.len())
-            + size_of::<Mat3>() * self.stiff.blocks.len()
-            + self.inner.bytes()
-    }
 }

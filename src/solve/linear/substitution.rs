@@ -41,7 +41,7 @@ struct Part<T> {
 
 impl<T: Number> Substitution<T> {
     /// Cuts the elimination tree of a factor.
-    pub(super) fn new(symbolic: &SymbolicCholesky<usize>) -> Result<Self, LinearError> {
+    pub(super) fn new(symbolic: &SymbolicCholesky<u32>) -> Result<Self, LinearError> {
         let n = symbolic.nrows();
         if n == 0 {
             return Ok(Self {
@@ -70,7 +70,7 @@ impl<T: Number> Substitution<T> {
     /// `x = L^-T L^-1 x`.
     pub(super) fn solve(
         &mut self,
-        symbolic: &SymbolicSupernodalCholesky<usize>,
+        symbolic: &SymbolicSupernodalCholesky<u32>,
         factor: &[T],
         x: &mut [T],
         workers: &Workers,
@@ -130,23 +130,23 @@ impl<T: Number> Substitution<T> {
     }
 }
 
-fn columns(symbolic: &SymbolicSupernodalCholesky<usize>, s: usize) -> Range<usize> {
-    symbolic.supernode_begin()[s]..symbolic.supernode_end()[s]
+fn columns(symbolic: &SymbolicSupernodalCholesky<u32>, s: usize) -> Range<usize> {
+    symbolic.supernode_begin()[s] as usize..symbolic.supernode_end()[s] as usize
 }
 
 /// Rows below a supernode's diagonal block, and where its panel is stored.
-fn panel(symbolic: &SymbolicSupernodalCholesky<usize>, s: usize) -> (&[usize], Range<usize>) {
+fn panel(symbolic: &SymbolicSupernodalCholesky<u32>, s: usize) -> (&[u32], Range<usize>) {
     let (rows, values) = (symbolic.col_ptr_for_row_idx(), symbolic.col_ptr_for_val());
     (
-        &symbolic.row_idx()[rows[s]..rows[s + 1]],
-        values[s]..values[s + 1],
+        &symbolic.row_idx()[rows[s] as usize..rows[s + 1] as usize],
+        values[s] as usize..values[s + 1] as usize,
     )
 }
 
 /// Plain loops over the columns of the panels beat the general dense kernels for one right-hand side
 /// and narrow panels.
 fn forward<T: Number>(
-    symbolic: &SymbolicSupernodalCholesky<usize>,
+    symbolic: &SymbolicSupernodalCholesky<u32>,
     factor: &[T],
     s: usize,
     x: &mut [T],
@@ -168,12 +168,12 @@ fn forward<T: Number>(
         }
     }
     for (b, row) in below.iter().zip(rows) {
-        x[*row] -= *b;
+        x[*row as usize] -= *b;
     }
 }
 
 fn backward<T: Number>(
-    symbolic: &SymbolicSupernodalCholesky<usize>,
+    symbolic: &SymbolicSupernodalCholesky<u32>,
     factor: &[T],
     s: usize,
     x: &mut [T],
@@ -184,7 +184,7 @@ fn backward<T: Number>(
     let (rows, values) = panel(symbolic, s);
     let below = &mut below[..rows.len()];
     for (b, row) in below.iter_mut().zip(rows) {
-        *b = x[*row];
+        *b = x[*row as usize];
     }
     for (j, column) in factor[values]
         .chunks_exact(width + rows.len())
@@ -197,7 +197,7 @@ fn backward<T: Number>(
 }
 
 /// Sets of supernodes that share no unknown, and the rest of the supernodes; all ascending.
-fn cut(symbolic: &SymbolicSupernodalCholesky<usize>) -> (Vec<Vec<usize>>, Vec<usize>) {
+fn cut(symbolic: &SymbolicSupernodalCholesky<u32>) -> (Vec<Vec<usize>>, Vec<usize>) {
     let count = symbolic.n_supernodes();
     if symbolic.len_val() < SMALL {
         return (Vec::new(), (0..count).collect());
@@ -213,8 +213,8 @@ fn cut(symbolic: &SymbolicSupernodalCholesky<usize>) -> (Vec<Vec<usize>>, Vec<us
     for s in 0..count {
         match panel(symbolic, s).0.iter().min() {
             Some(&row) => {
-                work[node_of[row]] += work[s];
-                children[node_of[row]].push(s);
+                work[node_of[row as usize]] += work[s];
+                children[node_of[row as usize]].push(s);
             }
             None => roots.push(s),
         }
