@@ -169,8 +169,9 @@ impl Sim {
         self.state.clone()
     }
 
-    /// Goes back to a state that this simulation was in.
+    /// Goes back to a state that this simulation was in since its regions changed last.
     pub fn roll_back(&mut self, state: State) -> Result<()> {
+        snapshot::check(&state, &self.state).map_err(Error::state)?;
         self.state = state;
         self.epoch += 1;
         self.take_yarns()

@@ -180,7 +180,8 @@ pub fn read(bytes: &[u8], own: &Origin, like: &State) -> Result<State> {
     Ok(state)
 }
 
-fn check(state: &State, like: &State) -> std::result::Result<(), String> {
+/// Refuses a state that does not fit `like`, a state of the simulation that is to take it.
+pub fn check(state: &State, like: &State) -> std::result::Result<(), String> {
     // what the topology of either has added or taken
     let (own, other) = (&like.topology, &state.topology);
     let [n, nodes] = [like.positions.len(), like.yarn_normals.len()]
