@@ -7,8 +7,8 @@ use std::collections::BTreeMap;
 use toile::body::Body;
 use toile::error::Status;
 use toile::math::{Vec2, Vec3};
-use toile::pattern::BlendRegion;
 use toile::pattern::import::garment_from_json;
+use toile::pattern::{BlendRegion, Shape};
 use toile::sim::{ContactSettings, DrapeOptions, Outcome, Sim, SimOptions};
 
 const LONG: f64 = 0.06;
@@ -52,7 +52,7 @@ fn between(from: f64, to: f64, rings: u32) -> Vec<BlendRegion> {
     let corners = [[from, -1.0], [to, -1.0], [to, 1.0], [from, 1.0]];
     vec![BlendRegion {
         panel: 0,
-        polygon: corners.map(Vec2::from).to_vec(),
+        shape: Shape::Polygon(corners.map(Vec2::from).to_vec()),
         rings,
     }]
 }

@@ -12,7 +12,7 @@ use super::types::{toile_garment, toile_garment_desc, toile_panel_desc, toile_se
 use crate::blend::trace;
 use crate::error::{Error, Result};
 use crate::math::Vec2;
-use crate::pattern::{BlendRegion, EdgeRef, Fabric, Garment, Panel, Seam, import};
+use crate::pattern::{BlendRegion, EdgeRef, Fabric, Garment, Panel, Seam, Shape, import};
 use crate::tri::triangulate;
 use std::ffi::c_char;
 use std::ptr;
@@ -307,7 +307,7 @@ pub(super) fn regions_with(
     }
     regions.push(BlendRegion {
         panel,
-        polygon: uv.iter().map(|&[u, v]| Vec2::new(u, v)).collect(),
+        shape: Shape::Polygon(uv.iter().map(|&[u, v]| Vec2::new(u, v)).collect()),
         rings,
     });
     Ok(regions)
