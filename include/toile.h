@@ -1141,9 +1141,10 @@ toile_status toile_sim_from_scene(const char *utf8,
                                   struct toile_sim **out);
 
 /**
- * The garment that the simulation was made of, as a new handle; free it with toile_garment_free.
+ * The garment that the simulation was made of, with its present regions of yarns, as a new handle; free it with toile_garment_free.
  */
-toile_status toile_sim_garment(const struct toile_sim *sim, struct toile_garment **out);
+toile_status toile_sim_garment(const struct toile_sim *sim,
+                               struct toile_garment **out);
 
 /**
  * Puts a body into the world, at the origin until it gets a pose. `contact` NULL takes the

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may panic")]
 
 use crate::mixed_hard::{garment, make, weave};
+use crate::sheets::Random;
 use crate::yarn_sims::{WHOLE, knit, sim};
 use std::collections::BTreeMap;
 use toile::body::Body;
@@ -136,6 +137,7 @@ fn change(sim: &mut Sim, regions: Vec<BlendRegion>, what: &str) {
         }
         jump = jump.max((sim.positions()[k] - x[k]).norm());
     }
+    assert!(sim.constraint_violation() < 1e-12, "{what}");
     println!("    no vertex goes farther than {jump:.2e} m");
     assert!(jump < 5e-5, "{what}: {jump}");
     let after = nodes(sim);
@@ -484,6 +486,35 @@ fn what_has_come_apart_stays_apart() {
     assert!(before.iter().all(|(uv, node)| after[uv] == *node));
     sim.yarns().unwrap().check().expect("mesh");
     let _ = sim.step(1e-3).expect("step");
+    // above the middle every contact of the yarn has slid by more than a pitch
+    let slips = sim.yarn_slips();
+    let slid = slips.iter().fold(0.0_f64, |m, s| m.max(s.abs()));
+    assert!(slid > 1.5e-3, "{slid}");
+    let low = |top| BlendRegion {
+        shape: Shape::Polygon(vec![
+            Vec2::new(0.0039, -1.0),
+            Vec2::new(1.0, -1.0),
+            Vec2::new(1.0, top),
+            Vec2::new(0.0039, top),
+        ]),
+        ..between(0.0, 1.0, 0).remove(0)
+    };
+    let saved = sim.save().unwrap();
+    sim.set_blend_regions(vec![low(0.0061)]).expect("low");
+    assert_eq!(sim.yarn_changes(), changes);
+    let error = sim.set_blend_regions(vec![low(1.0)]).expect_err("slid");
+    assert!(error.message.contains("has slid so far"), "{error}");
+    assert!(sim.restore(&saved).is_err());
+    let mut sim = {
+        // as it was before
+        let mut again =
+            crate::yarn_sims::sim(&text, 0.0, &[("solver.newton.relative_tolerance", 1e-3)]);
+        again
+            .set_blend_regions(between(0.0039, 0.1, 0))
+            .expect("same");
+        again.restore(&saved).expect("state");
+        again
+    };
     for regions in [Vec::new(), between(0.0039, 0.0121, 0)] {
         let saved = sim.save().unwrap();
         let error = sim.set_blend_regions(regions).expect_err("left out");
@@ -567,4 +598,62 @@ fn a_compensated_knit_comes_into_triangles() {
         let report = sim.step(1e-3).expect("step");
         assert!(report.newton_iterations < 60, "{report:?}");
     }
+}
+
+/// Regions of any kind in any order, with steps between them: whatever is accepted is sound, whatever is refused has changed nothing.
+#[test]
+fn regions_in_any_order_stay_sound() {
+    let seam = r#"{"a": ["p0", 1], "b": ["p1", 3]}"#;
+    let text = garment(&weave(1e-3, 1.0), 3e-3, &[(0.0, &[]), (0.03, &[])], seam);
+    let mut random = Random::new(7);
+    let mut unit = || 0.5 * (random.signed() + 1.0);
+    let mut sim = make(&text, -9.81).expect("sim");
+    let held: Vec<u32> = (0..sim.positions().len() as u32)
+        .filter(|v| sim.placed(*v).x < 1e-9)
+        .collect();
+    sim.pin(&held, None).unwrap();
+    let mass: f64 = sim.point_masses().iter().sum();
+    let mut accepted = 0;
+    for k in 0..14 {
+        let rings = (3.0 * unit()) as u32;
+        let mut regions = Vec::new();
+        for panel in 0..2 {
+            let radius = 0.004 + 0.008 * unit();
+            let center = Vec2::new(0.006 + 0.024 * unit(), 0.03 * unit());
+            let shape = match (3.0 * unit()) as u32 {
+                0 => Shape::Disc { center, radius },
+                1 => Shape::Edge {
+                    edge: if panel == 0 { 1 } else { 3 },
+                    width: radius,
+                },
+                _ => continue,
+            };
+            regions.push(BlendRegion {
+                panel,
+                shape,
+                rings,
+            });
+        }
+        let what = format!("{k}: {rings} rings, {regions:?}");
+        let before = sim.save().unwrap();
+        match sim.set_blend_regions(regions) {
+            Ok(done) => {
+                accepted += 1;
+                println!("{what}: {done:?}");
+            }
+            Err(error) => {
+                println!("{what}: {error}");
+                assert_eq!(sim.save().unwrap(), before);
+            }
+        }
+        if let Some(mesh) = sim.yarns() {
+            mesh.check().expect("mesh");
+        }
+        let _ = sim.step(3e-3).expect(&what);
+        let _ = sim.step(3e-3).expect(&what);
+        crate::mixed_hard::is_sound(&sim, &what);
+        let now: f64 = sim.point_masses().iter().sum();
+        assert!((now / mass - 1.0).abs() < 0.03, "{what}: {now} {mass}");
+    }
+    assert!(accepted >= 8, "{accepted}");
 }

@@ -170,7 +170,7 @@ pub unsafe extern "C" fn toile_sim_from_scene(
     })
 }
 
-/// The garment that the simulation was made of, as a new handle; free it with toile_garment_free.
+/// The garment that the simulation was made of, with its present regions of yarns, as a new handle; free it with toile_garment_free.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn toile_sim_garment(
     sim: *const toile_sim,

@@ -27,8 +27,8 @@ use crate::yarn::{Names, Topology, YarnMesh};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Least length of a segment that comes in over its laid one.
-const LEAST: f64 = 0.2;
+/// Most that a segment that comes in may be longer or shorter than laid, over that.
+const MOST_SLIP: f64 = 0.8;
 
 /// What a change of regions did.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -230,11 +230,11 @@ impl Sim {
                 let known = before.passages[i - 1].is_some() && before.passages[i].is_some();
                 let laid = mesh.incidences[i].u - mesh.incidences[i - 1].u;
                 let length = u[i] - u[i - 1];
-                if !known && !(length >= LEAST * laid) {
+                if !known && !((length - laid).abs() <= MOST_SLIP * laid) {
                     let n = mesh.incidences[i].node as usize;
                     return Err(Error::state(format!(
-                        "panel '{}': a yarn has slid so far near ({:.4}, {:.4}) m that {length:.3e} m of it are left where {laid:.3e} m \
-                         would be laid beside it",
+                        "panel '{}': a yarn has slid so far that {length:.3e} m of it would lie near ({:.4}, {:.4}) m, where {laid:.3e} m \
+                         are laid",
                         self.garment.panels[mesh.node_panel[n] as usize].name,
                         mesh.uv[n].x,
                         mesh.uv[n].y
