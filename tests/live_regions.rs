@@ -657,3 +657,27 @@ fn regions_in_any_order_stay_sound() {
     }
     assert!(accepted >= 8, "{accepted}");
 }
+
+/// What hosts may ask of rings is taken when yarns come in.
+#[test]
+fn means_of_rings_and_enriched_yarns_come_in_as_well() {
+    let cases = [
+        ("blend.means", between(0.0199, 0.0401, 1)),
+        ("blend.enrich_everywhere", between(-1.0, 1.0, 0)),
+    ];
+    for (name, region) in cases {
+        let mut sim = strip(-9.81);
+        steps(&mut sim, 20, 8);
+        let held: Vec<u32> = (0..sim.positions().len() as u32)
+            .filter(|v| sim.is_pinned(*v))
+            .collect();
+        sim.unpin(&held).unwrap();
+        sim.set_number(name, 1.0).expect(name);
+        change(&mut sim, region, name);
+        steps(&mut sim, 5, 10);
+        let error = sim.set_number(name, 0.0).expect_err(name);
+        assert!(error.message.contains("when yarns come in"), "{error}");
+        change(&mut sim, Vec::new(), name);
+        steps(&mut sim, 5, 10);
+    }
+}

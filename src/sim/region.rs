@@ -106,6 +106,9 @@ impl Sim {
 
     /// What yarns have left, in the new part; they must be whole there.
     fn topology_in(&self, old: &YarnPart, new: Option<&YarnPart>) -> Result<Topology> {
+        if old.topology == Topology::default() {
+            return Ok(Topology::default());
+        }
         let laid = old.now.mesh.uv.len() - old.topology.split.len();
         let empty = YarnMesh::default();
         let mesh = new.map_or(&empty, |part| &part.now.mesh);
