@@ -23,7 +23,7 @@ use std::path::PathBuf;
 use toile::body::Body;
 use toile::math::{Vec2, Vec3};
 use toile::pattern::import::garment_from_json;
-use toile::pattern::{BlendRegion, Fabric, Garment};
+use toile::pattern::{BlendRegion, Fabric, Garment, Shape};
 use toile::sim::{ContactSettings, DrapeOptions, Settings, Sim, SimOptions};
 
 /// Steps, and what one takes [s].
@@ -83,7 +83,7 @@ impl Scene {
         let mut garment = self.garment.clone();
         let list = regions.iter().map(|(panel, polygon)| BlendRegion {
             panel: *panel,
-            polygon: polygon.clone(),
+            shape: Shape::Polygon(polygon.clone()),
             rings,
         });
         garment.blend_regions = list.collect();
