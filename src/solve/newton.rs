@@ -38,8 +38,8 @@ pub struct Tolerance {
     pub relative: f64,
     /// What the decrease in all of them is counted from [J], where that is not the start.
     pub first: Option<f64>,
-    /// A full correction over the whole displacement, both as root mean squares weighted by what
-    /// inertia resists with.
+    /// A full correction, with what few nodes were moved for it, over the whole displacement, both as root mean squares weighted by
+    /// what inertia resists with.
     pub motion: f64,
     /// Largest force on a free vertex [N].
     pub force: f64,
@@ -165,6 +165,13 @@ impl Problem<'_> {
             0.5 * self.inertia.weight[i] * (x[i] - self.inertia.center[i]).norm_squared()
         });
         inertia + energy(self.terms, &self.at(x), self.workers)
+    }
+
+    /// Distance of two points, weighted by what inertia resists with [N m, square root].
+    fn weighed(&self, a: &[Vec3], b: &[Vec3]) -> f64 {
+        let pairs = a.iter().zip(b).zip(self.inertia.measure);
+        let square = |((a, b), w): ((&Vec3, &Vec3), &f64)| w * (b - a).norm_squared();
+        pairs.map(square).sum::<f64>().sqrt()
     }
 
     /// Names an energy that is not finite.
@@ -412,7 +419,7 @@ impl Problem<'_> {
             // below the rounding of the energy a decrease cannot be seen: trust the correction
             let noise = 1e-13 * value.abs().max(1e-12);
             let mut length = 1.0;
-            let mut gain = 0.0;
+            let (mut gain, mut moved) = (0.0, f64::INFINITY);
             let mut mended = !settles;
             loop {
                 for i in 0..n {
@@ -435,6 +442,9 @@ impl Problem<'_> {
                     }
                 }
                 if trial <= most {
+                    if tolerance.motion > 0.0 {
+                        moved = self.weighed(x, &work.trial);
+                    }
                     x.copy_from_slice(&work.trial);
                     gain = value - trial;
                     value = trial;
@@ -466,13 +476,7 @@ impl Problem<'_> {
                 return Ok(summary);
             }
             if tolerance.motion > 0.0 && length == 1.0 {
-                let weighed = |from: &dyn Fn(usize) -> Vec3| {
-                    let square = |i| self.inertia.measure[i] * from(i).norm_squared();
-                    (0..n).map(square).sum::<f64>()
-                };
-                let last = weighed(&|i| work.direction[i]);
-                let whole = weighed(&|i| x[i] - self.x0[i]);
-                if last <= tolerance.motion * tolerance.motion * whole {
+                if moved <= tolerance.motion * self.weighed(self.x0, x) {
                     summary.converged = true;
                     return Ok(summary);
                 }
