@@ -80,6 +80,8 @@ mod mixed_patches;
 mod mixed_pucker;
 #[path = "mixed_riders.rs"]
 mod mixed_riders;
+#[path = "mixed_scenes.rs"]
+mod mixed_scenes;
 #[path = "pattern_bytes.rs"]
 mod pattern_bytes;
 #[path = "pattern_check.rs"]
