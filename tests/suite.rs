@@ -164,3 +164,5 @@ mod yarn_terms_symmetry;
 mod yarn_topology;
 #[path = "yarn_weave.rs"]
 mod yarn_weave;
+#[path = "yarn_worn.rs"]
+mod yarn_worn;
