@@ -3,7 +3,7 @@
 //! GarmentCode's T-shirt is draped as triangles on the body that it was drawn for; then yarns of garter stitch are laid on all of its panels,
 //! tied at the seams, and taken to where the triangles lie. Loops are as wide as gives their number: 56 000 for the
 //! sweater of figure 1, 325 000 for the T-shirt of figure 10; the yarn is the sweater's, as thick for its loops. Every yarn springs from its flat layout
-//! in the first steps of 1 ms, at several metres a second; cloth does not touch itself, since a node may come near others by 0.15 radii a
+//! in the first steps of 1 ms; cloth does not touch itself, since a node may come near others by 0.15 radii a
 //! substep only, which made 33 to 38 substeps of each step with 5 000 loops. Prints what is laid and its memory, and for each step Newton and linear iterations, processor
 //! microseconds a node and step, memory a node with the matrix and its factor, the seams' largest gap, and the smallest gap
 //! to the body. Wants `TOILE_DATA`; one thread.
