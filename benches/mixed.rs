@@ -24,7 +24,7 @@ use std::f64::consts::PI;
 use toile::body::Body;
 use toile::math::{Vec2, Vec3};
 use toile::pattern::import::garment_from_json;
-use toile::pattern::{BlendRegion, Garment};
+use toile::pattern::{BlendRegion, Garment, Shape};
 use toile::sim::{ContactSettings, DrapeOptions, Settings, Sim, SimOptions};
 
 /// Steps, and what one takes [s].
@@ -84,7 +84,7 @@ impl Scene {
         let mut garment = self.garment.clone();
         let list = regions.iter().map(|(panel, polygon)| BlendRegion {
             panel: *panel,
-            polygon: polygon.clone(),
+            shape: Shape::Polygon(polygon.clone()),
             rings,
         });
         garment.blend_regions = list.collect();

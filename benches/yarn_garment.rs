@@ -20,7 +20,7 @@ mod common;
 use common::cpu;
 use toile::math::Vec2;
 use toile::pattern::yarn_fabric::{Structure, YarnFabric};
-use toile::pattern::{BlendRegion, Garment};
+use toile::pattern::{BlendRegion, Garment, Shape};
 use toile::sim::{ContactSettings, DrapeOptions, Settings, Sim, SimOptions};
 use toile::yarn::{Layout, lay};
 
@@ -94,7 +94,7 @@ fn main() {
     let whole = [[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]];
     let region = |panel| BlendRegion {
         panel,
-        polygon: whole.map(|[u, v]| Vec2::new(u, v)).to_vec(),
+        shape: Shape::Polygon(whole.map(|[u, v]| Vec2::new(u, v)).to_vec()),
         rings: 0,
     };
     let panels = 0..garment.panels.len() as u32;

@@ -677,8 +677,8 @@ typedef struct toile_yarn_changes {
      */
     size_t struct_size;
     /**
-     * Grows whenever any of these numbers, or the arrays that count nodes and passages, change. 0 without
-     * yarns, 1 as laid.
+     * Grows whenever any of these numbers, or the arrays that count nodes and passages, change, with regions too. 0 before
+     * there are yarns, 1 as they are laid first.
      */
     uint64_t epoch;
     /**
@@ -1141,9 +1141,10 @@ toile_status toile_sim_from_scene(const char *utf8,
                                   struct toile_sim **out);
 
 /**
- * The garment that the simulation was made of, as a new handle; free it with toile_garment_free.
+ * The garment that the simulation was made of, with its present regions of yarns, as a new handle; free it with toile_garment_free.
  */
-toile_status toile_sim_garment(const struct toile_sim *sim, struct toile_garment **out);
+toile_status toile_sim_garment(const struct toile_sim *sim,
+                               struct toile_garment **out);
 
 /**
  * Puts a body into the world, at the origin until it gets a pose. `contact` NULL takes the
@@ -1189,18 +1190,6 @@ toile_status toile_sim_pin(struct toile_sim *sim,
  * Lets vertices go. TOILE_E_ARGUMENT names one that is not held.
  */
 toile_status toile_sim_unpin(struct toile_sim *sim, const uint32_t *vertices, size_t count);
-
-/**
- * Moves the region in which every yarn is simulated, with the state carried over: a polygon of a
- * panel in flat coordinates [m], shape [count, 2], and `rings` hybrid rings around it. A count of 0
- * takes the region away. TOILE_E_UNSUPPORTED: this version takes regions only when the simulation is
- * made; a count of 0 on a panel without yarns is fine.
- */
-toile_status toile_sim_set_blend_region(struct toile_sim *sim,
-                                        uint32_t panel,
-                                        const double *uv,
-                                        size_t count,
-                                        uint32_t rings);
 
 /**
  * Sets a tunable number by its dotted name, the same as in scene files:
@@ -1517,8 +1506,8 @@ toile_status toile_sim_yarn_forces(const struct toile_sim *sim,
                                    size_t *needed);
 
 /**
- * What has changed since the yarns were laid: contacts that yarns came out of. `epoch` grows with every step, drape or
- * restored state that changes it.
+ * What has changed since the yarns were laid: contacts that yarns came out of. `epoch` grows with every step, drape,
+ * restored state or change of regions that changes it.
  */
 toile_status toile_sim_yarn_changes(const struct toile_sim *sim,
                                     struct toile_yarn_changes *out);
@@ -1578,6 +1567,31 @@ toile_status toile_sim_vertex_errors(const struct toile_sim *sim,
                                      double *out,
                                      size_t capacity,
                                      size_t *needed);
+
+/**
+ * Moves the region of a panel in which every yarn is simulated, with the state carried over: a polygon in flat coordinates [m],
+ * shape [count, 2], with `rings` hybrid rings around it, in the place of the panel's earlier regions; a count of 0 takes them away.
+ * Yarns that come in lie in the triangles as these are and move with them; vertices stay where they are. The arrays of yarns
+ * change their sizes and numbers, the epoch of toile_sim_yarn_changes grows; states that were saved under other regions are refused.
+ * What toile_sim_create refuses is refused; TOILE_E_STATE: a held vertex would follow yarns, a held node would go or ride
+ * on triangles, or the region leaves out where yarns have come out of contacts.
+ */
+toile_status toile_sim_set_blend_region(struct toile_sim *sim,
+                                        uint32_t panel,
+                                        const double *uv,
+                                        size_t count,
+                                        uint32_t rings);
+
+/**
+ * Moves all regions at once, with the state carried over: yarns are simulated in the triangles whose three corners have an `alpha` of 1,
+ * with `rings` hybrid rings around them. One number from 0 to 1 for each vertex, shape [count], as toile_sim_suggest_region gives
+ * them; values below 1 are those of the rings, 0 everywhere takes all yarns away. Otherwise as toile_sim_set_blend_region, and
+ * TOILE_E_ARGUMENT as in toile_garment_set_blend_vertices.
+ */
+toile_status toile_sim_set_blend_vertices(struct toile_sim *sim,
+                                          const double *alpha,
+                                          size_t count,
+                                          uint32_t rings);
 
 /**
  * Positions of the vertices [m] as they are now, shape [vertex_count, 3], kept as they are until

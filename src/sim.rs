@@ -1,10 +1,11 @@
 //! The one Rust facade: a garment in a world, stepped, draped, edited, saved, restored.
 //!
 //! Here: making, saving and restoring a [`Sim`]. `run` lets time pass, `world` edits what is around
-//! the cloth, `pins` holds it, `read` tells what there is.
+//! the cloth, `pins` holds it, `region` moves regions of yarns, `read` tells what there is.
 
 mod pins;
 mod read;
+mod region;
 mod run;
 mod suggest;
 mod world;
@@ -20,13 +21,14 @@ use crate::pattern::Garment;
 use crate::solve::engine::Engine;
 pub use crate::solve::report::{Energies, Outcome, StepReport};
 pub use crate::solve::settings::Settings;
-use crate::system::build::{BuildOptions, System};
+use crate::system::build::System;
 use crate::system::snapshot::{self, Origin};
 use crate::system::state::State;
 pub use crate::system::term::ContactSettings;
 use crate::tri::GarmentMesh;
 use crate::yarn::Topology;
 pub use read::SystemInfo;
+pub use region::RegionChange;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 pub use yarns::YarnChanges;
 use yarns::YarnPart;
@@ -68,12 +70,16 @@ pub struct Progress {
 pub struct Sim {
     garment: Garment,
     settings: Settings,
+    /// What its fabrics were found with.
+    first_settings: Settings,
     state: State,
     bodies: Vec<(Body, ContactSettings)>,
     engine: Mutex<Engine>,
     mesh: GarmentMesh,
     masses: Vec<f64>,
     yarns: Option<YarnPart>,
+    /// Grows whenever the yarns change.
+    yarn_epoch: u64,
     epoch: u64,
     origin: Origin,
 }
@@ -94,22 +100,18 @@ impl Sim {
         finite("gravity", &gravity)?;
         finite("wind", &options.wind)?;
         finite("pressure", &[options.pressure])?;
-        let mut cloth = Cloth::new(garment, mesh.clone())?;
-        let masses = cloth.masses.clone();
-        let yarns = YarnPart::new(garment, &mesh, &options.settings)?;
-        if let Some(part) = &yarns {
-            cloth = part.rest_of(garment, &mesh)?;
-        }
+        let masses = Cloth::new(garment, mesh.clone())?.masses;
+        let compiled = Compiled::new(garment, &mesh, &options.settings, &options.settings)?;
+        let Compiled {
+            yarns,
+            fingerprint,
+            system,
+        } = compiled;
         let origin = Origin {
-            garment: snapshot::fingerprint(&cloth, &garment.blend_regions),
+            garment: fingerprint,
             bodies: Vec::new(),
             numbers: options.settings.that_matter(),
         };
-        let laid = yarns.as_ref().map(|part| part.now.clone());
-        let coupling =
-            (yarns.as_ref()).map_or_else(Coupling::default, |part| part.coupling.clone());
-        let build = BuildOptions::from(&options.settings);
-        let system = System::with_yarns(cloth, laid, coupling, &build)?;
         let mut state = State {
             time: 0.0,
             positions: mesh.placed.clone(),
@@ -135,11 +137,13 @@ impl Sim {
         Ok(Self {
             garment: garment.clone(),
             settings: options.settings.clone(),
+            first_settings: options.settings.clone(),
             state,
             bodies: Vec::new(),
             engine: Mutex::new(Engine::new(system, &options.settings)),
             mesh,
             masses,
+            yarn_epoch: u64::from(yarns.is_some()),
             yarns,
             epoch: 1,
             origin,
@@ -165,8 +169,9 @@ impl Sim {
         self.state.clone()
     }
 
-    /// Goes back to a state that this simulation was in.
+    /// Goes back to a state that this simulation was in since its regions changed last.
     pub fn roll_back(&mut self, state: State) -> Result<()> {
+        snapshot::check(&state, &self.state).map_err(Error::state)?;
         self.state = state;
         self.epoch += 1;
         self.take_yarns()
@@ -195,6 +200,39 @@ impl Sim {
         }
         self.epoch += 1;
         Ok(())
+    }
+}
+
+/// A garment with its regions of yarns, as it is simulated.
+struct Compiled {
+    yarns: Option<YarnPart>,
+    fingerprint: u64,
+    system: System,
+}
+
+impl Compiled {
+    /// `found` are the settings that fabrics are found with, the same for as long as the simulation lives.
+    fn new(
+        garment: &Garment,
+        mesh: &GarmentMesh,
+        settings: &Settings,
+        found: &Settings,
+    ) -> Result<Self> {
+        let yarns = YarnPart::new(garment, mesh, settings, found)?;
+        let cloth = match &yarns {
+            Some(part) => part.rest_of(garment, mesh)?,
+            None => Cloth::new(garment, mesh.clone())?,
+        };
+        let fingerprint = snapshot::fingerprint(&cloth, &garment.blend_regions);
+        let laid = yarns.as_ref().map(|part| part.now.clone());
+        let coupling =
+            (yarns.as_ref()).map_or_else(Coupling::default, |part| part.coupling.clone());
+        let system = System::with_yarns(cloth, laid, coupling, &settings.into())?;
+        Ok(Self {
+            yarns,
+            fingerprint,
+            system,
+        })
     }
 }
 

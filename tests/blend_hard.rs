@@ -183,8 +183,5 @@ fn rings_that_cannot_be_are_refused() {
     let error = sim.pin_yarn_nodes(&[node], None).expect_err("blended");
     assert!(error.message.contains("hybrid ring"), "{error}");
     let error = sim.set_number("blend.means", 1.0).expect_err("later");
-    assert!(
-        error.message.contains("when a simulation is made"),
-        "{error}"
-    );
+    assert!(error.message.contains("when yarns come in"), "{error}");
 }

@@ -31,7 +31,7 @@ fn examples() -> Vec<PathBuf> {
         .filter(|p| matches!(p.extension().and_then(OsStr::to_str), Some("c" | "cpp")))
         .collect();
     found.sort();
-    assert!(found.len() >= 9, "{found:?}");
+    assert!(found.len() >= 10, "{found:?}");
     found
 }
 

@@ -48,6 +48,7 @@ fn with_sim(sim: *mut toile_sim) -> Vec<(&'static str, toile_status)> {
         toile_sim_pin_yarn_nodes(ptr::null(), 0, ptr::null()),
         toile_sim_unpin_yarn_nodes(ptr::null(), 0),
         toile_sim_set_blend_region(0, ptr::null(), 0, 0),
+        toile_sim_set_blend_vertices(ptr::null(), 0, 0),
         toile_sim_locate(0, zero.as_ptr(), &mut count),
         toile_sim_step(0.01, &mut report),
         toile_sim_drape(ptr::null(), &mut report),

@@ -48,6 +48,7 @@ fn numbers_that_are_not_finite_are_refused_at_the_door_and_change_nothing() {
                 toile_sim_set_gravity(sim.0, point.as_ptr()),
                 toile_sim_set_wind(sim.0, point.as_ptr()),
                 toile_sim_set_blend_region(sim.0, 0, [bad; 6].as_ptr(), 3, 1),
+                toile_sim_set_blend_vertices(sim.0, many[2 * n..].as_ptr(), n, 1),
                 toile_sim_locate(sim.0, 0, [bad, 0.0].as_ptr(), &mut vertex),
             ];
             for contact in &contacts {

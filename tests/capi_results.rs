@@ -31,7 +31,8 @@ fn triangles_alone_have_no_yarns_and_nobody_pretends() {
         let uv = [-0.05, -0.05, 0.05, -0.05, 0.0, 0.05];
         let before = (sim.save(), sim.epoch());
         let status = toile_sim_set_blend_region(sim.0, 0, uv.as_ptr(), 3, 2);
-        fails(status, TOILE_E_UNSUPPORTED);
+        fails(status, TOILE_E_ARGUMENT);
+        assert!(last_error().contains("has no yarns"), "{}", last_error());
         fails(
             toile_sim_set_blend_region(sim.0, 9, uv.as_ptr(), 3, 2),
             TOILE_E_ARGUMENT,

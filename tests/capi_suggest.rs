@@ -69,6 +69,23 @@ fn a_suggested_region_is_one_that_a_garment_takes() {
     assert_eq!(info.active_triangles, out.active_triangles);
     let ratio = info.yarn_nodes as f64 / out.yarn_nodes as f64;
     assert!((0.95..1.05).contains(&ratio), "{ratio}");
+    // the simulation that was asked takes it as it lives
+    let x = sim.positions();
+    ok(unsafe { toile_sim_set_blend_vertices(sim.0, alpha.as_ptr(), count, 0) });
+    assert_eq!(sim.positions(), x);
+    assert!(sim.epoch() > epoch);
+    let mut live = filled(toile_system_info_init);
+    ok(unsafe { toile_sim_info(sim.0, &mut live) });
+    assert_eq!(
+        (live.yarn_nodes, live.active_triangles, live.unknowns),
+        (info.yarn_nodes, info.active_triangles, info.unknowns)
+    );
+    let few = unsafe { toile_sim_set_blend_vertices(sim.0, alpha.as_ptr(), count - 1, 0) };
+    fails(few, TOILE_E_ARGUMENT);
+    let _ = sim.step(1e-3);
+    ok(unsafe { toile_sim_set_blend_region(sim.0, 0, ptr::null(), 0, 0) });
+    ok(unsafe { toile_sim_info(sim.0, &mut live) });
+    assert_eq!(live.yarn_nodes, 0);
     // the mixed one is not asked again
     let status = unsafe { toile_sim_suggest_region(mixed.0, &desc, none, 0, unasked, none.cast()) };
     fails(status, TOILE_E_UNSUPPORTED);

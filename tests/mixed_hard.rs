@@ -5,6 +5,7 @@
 use toile::body::Body;
 use toile::error::{Error, Status};
 use toile::math::Vec3;
+use toile::pattern::export::garment_to_json;
 use toile::pattern::import::garment_from_json;
 use toile::sim::{ContactSettings, DrapeOptions, Outcome, Sim, SimOptions};
 
@@ -310,4 +311,86 @@ fn regions_that_cannot_be_are_refused() {
         .position(|a| !a)
         .expect("follower");
     assert!(sim.pin(&[follower as u32], None).is_err());
+}
+
+/// Discs, and what is near an edge or on both sides of a seam: the triangles whose corners are, as a garment that is written and read
+/// again says too.
+#[test]
+fn regions_are_discs_and_what_is_beside_edges_and_seams() {
+    let seam = r#"{"a": ["p0", 1], "b": ["p1", 3]}"#;
+    let text = garment(&weave(1e-3, 1.0), 3e-3, &[(0.0, &[]), (0.03, &[])], seam);
+    let with = |regions: &str| {
+        let place = r#""blend_regions": ["#;
+        text.replace(place, &format!("{place}{regions}"))
+    };
+    let disc = r#"{"panel": "p0", "disc": {"center": [0.012, 0.011], "radius": 0.0081}}"#;
+    let edge = r#"{"panel": "p0", "edge": 0, "width": 0.007}"#;
+    let both = r#"{"seam": 0, "width": 0.0091, "rings": 0}"#;
+    type Holds<'a> = &'a dyn Fn(u32, f64, f64) -> bool;
+    let far = 1e-9;
+    let cases: [(&str, Holds<'_>); 3] = [
+        (disc, &|p, u, v| {
+            p == 0 && (u - 0.012).hypot(v - 0.011) <= 0.0081 + far
+        }),
+        (edge, &|p, _, v| p == 0 && v <= 0.007 + far),
+        (both, &|p, u, _| {
+            if p == 0 {
+                u >= 0.03 - 0.0091 - far
+            } else {
+                u <= 0.0091 + far
+            }
+        }),
+    ];
+    for (region, holds) in cases {
+        let sim = make(&with(region), 0.0).expect(region);
+        let mesh = sim.mesh();
+        let inside = |v: &u32| {
+            let (panel, uv) = (mesh.vertex_panel[*v as usize], mesh.uv[*v as usize]);
+            holds(panel, uv.x, uv.y)
+        };
+        let whole = mesh.triangles.iter().filter(|t| t.iter().all(inside));
+        let left = sim.info().active_triangles;
+        let taken = sim.info().triangles - left;
+        assert!(taken > 3 && taken == whole.count(), "{region}: {taken}");
+        let json = garment_to_json(sim.garment()).expect("json");
+        let again = garment_from_json(&json, None).expect("garment");
+        assert_eq!(again.blend_regions, sim.garment().blend_regions);
+        let twice = make(&json, 0.0).expect("again");
+        assert_eq!(twice.save().unwrap(), sim.save().unwrap(), "{region}");
+    }
+    let refused = [
+        (r#"{"panel": "p0"}"#, "one of 'polygon'"),
+        (
+            r#"{"panel": "p0", "edge": 0, "seam": 0, "width": 1}"#,
+            "not 2",
+        ),
+        (r#"{"panel": "p0", "edge": 0}"#, "'width' is missing"),
+        (
+            r#"{"panel": "p0", "edge": 4, "width": 0.01}"#,
+            "edge 4 of 4",
+        ),
+        (
+            r#"{"panel": "p0", "edge": 0, "width": 0}"#,
+            "must be positive",
+        ),
+        (r#"{"seam": 1, "width": 0.01}"#, "seam 1 of 1"),
+        (r#"{"panel": "p0", "seam": 0, "width": 0.01}"#, "no meaning"),
+        (
+            r#"{"panel": "p0", "width": 1, "disc": {"center": [0, 0], "radius": 1}}"#,
+            "no meaning",
+        ),
+        (
+            r#"{"panel": "p0", "disc": {"center": [0, 0], "radius": -1}}"#,
+            "must be positive",
+        ),
+        (
+            r#"{"panel": "p0", "disc": {"center": [0, 0]}}"#,
+            "'radius' is missing",
+        ),
+    ];
+    for (region, words) in refused {
+        let read = garment_from_json(&with(region), None);
+        let error = read.and_then(|g| g.check_geometry()).expect_err(region);
+        assert!(error.message.contains(words), "{region}: {error}");
+    }
 }

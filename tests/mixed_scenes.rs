@@ -3,7 +3,7 @@
 
 use std::path::Path;
 use toile::math::{Vec2, Vec3};
-use toile::pattern::BlendRegion;
+use toile::pattern::{BlendRegion, Shape};
 use toile::scene::Scene;
 use toile::sim::{DrapeOptions, Sim, StepReport};
 use toile::sim_scene::{Driver, along, build};
@@ -19,7 +19,7 @@ fn full(mut scene: Scene) -> Scene {
     let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
     let region = |panel| BlendRegion {
         panel,
-        polygon: corners.map(|[u, v]| Vec2::new(u, v)).to_vec(),
+        shape: Shape::Polygon(corners.map(|[u, v]| Vec2::new(u, v)).to_vec()),
         rings: 0,
     };
     let panels = 0..scene.garment.panels.len() as u32;

@@ -2,7 +2,7 @@
 
 use toile::math::Vec2;
 use toile::pattern::curve::Curve;
-use toile::pattern::{BlendRegion, Edge, EdgeRef, Fabric, Garment, Seam};
+use toile::pattern::{BlendRegion, Edge, EdgeRef, Fabric, Garment, Seam, Shape};
 use toile::tri::grid::{rectangle, sheet_garment};
 
 fn base() -> Garment {
@@ -292,7 +292,7 @@ fn edges_sewn_twice_and_overlapping_darts_are_refused() {
 fn blend_regions_are_checked() {
     let region = |panel, count: usize| BlendRegion {
         panel,
-        polygon: vec![Vec2::new(0.1, 0.1); count],
+        shape: Shape::Polygon(vec![Vec2::new(0.1, 0.1); count]),
         rings: 2,
     };
     refused(

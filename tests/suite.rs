@@ -72,6 +72,8 @@ mod layering;
 mod licences;
 #[path = "linear_solvers.rs"]
 mod linear_solvers;
+#[path = "live_regions.rs"]
+mod live_regions;
 #[path = "mixed_hard.rs"]
 mod mixed_hard;
 #[path = "mixed_patches.rs"]

@@ -276,7 +276,7 @@ def test_garments_are_edited_and_read():
         assert [sim[f"gravity.{k}"] for k in "xyz"] == [0, 1, 2]
         assert [sim[f"wind.{k}"] for k in "xyz"] == [3, 4, 5]
         sim.set_blend_region(0, np.empty((0, 2)))
-        with pytest.raises(toile.ToileError):
+        with pytest.raises(toile.UsageError, match="has no yarns"):
             sim.set_blend_region(0, [[0, 0], [0.1, 0], [0.1, 0.1]])
 
 
@@ -336,6 +336,16 @@ def test_a_suggested_region_goes_into_the_garment():
             sim.suggest_region()
         with pytest.raises(ValueError):
             sim.suggest_region(budget=-1)
+        # live: vertices stay where they are
+        before = sim.positions.copy()
+        sim.set_blend_vertices(alpha)
+        assert (sim.positions == before).all() and len(sim.yarn_nodes) > 0
+        assert sim.info.active_triangles == found.active_triangles
+        sim.step(1e-4)
+        sim.set_blend_region(0, np.empty((0, 2)))
+        assert len(sim.yarn_nodes) == 0
+        with pytest.raises(ValueError):
+            sim.set_blend_vertices(np.ones((2, 2)))
     garment.set_blend_vertices(alpha)
     with toile.Sim(garment) as sim:
         assert sim.info.active_triangles == found.active_triangles

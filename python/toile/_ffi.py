@@ -262,6 +262,7 @@ FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
     "toile_sim_set_gravity": (c_int32, [handle, _f64]),
     "toile_sim_set_wind": (c_int32, [handle, _f64]),
     "toile_sim_set_blend_region": (c_int32, [handle, c_uint32, _f64, c_size_t, c_uint32]),
+    "toile_sim_set_blend_vertices": (c_int32, [handle, _f64, c_size_t, c_uint32]),
     "toile_sim_set_number": (c_int32, [handle, c_char_p, c_double]),
     "toile_sim_number": (c_int32, [handle, c_char_p, _f64]),
     "toile_sim_set_positions": (c_int32, [handle, _f64, _f64, c_size_t]),

@@ -9,7 +9,19 @@ from typing import Any, Callable, Optional
 import numpy as np
 
 from . import _ffi
-from ._arrays import Array, PathLike, _copy, _dir, _encode, _f64, _pointer, _text, _u32, _vector
+from ._arrays import (
+    Array,
+    PathLike,
+    _copy,
+    _dir,
+    _encode,
+    _f64,
+    _pointer,
+    _real,
+    _text,
+    _u32,
+    _vector,
+)
 from ._body import Body
 from ._errors import _check
 from ._ffi import lib
@@ -124,9 +136,20 @@ class Sim(_Owner):
 
     def set_blend_region(self, panel: int, polygon: Array, rings: int = 2) -> None:
         """Moves the region of a panel in which every yarn is simulated, as
-        :meth:`Garment.set_blend_region` says it; raises where the library cannot do that."""
+        :meth:`Garment.set_blend_region` says it, with the state carried over: yarns come into the triangles as
+        these are. The yarns' arrays change."""
         uv = _f64(polygon, 2, "polygon")
         _check(lib.toile_sim_set_blend_region(self.handle, panel, _pointer(uv), len(uv), rings))
+
+    def set_blend_vertices(self, alpha: Array, rings: int = 0) -> None:
+        """Moves all regions at once, as :meth:`Garment.set_blend_vertices` says them, with the state carried
+        over; takes what :meth:`suggest_region` gives."""
+        values = _real(alpha, "alpha")
+        if values.ndim != 1:
+            raise ValueError(f"alpha: shape {values.shape}, expected (vertices,)")
+        _check(
+            lib.toile_sim_set_blend_vertices(self.handle, _pointer(values), len(values), rings)
+        )
 
     def body_wrench(self, body: int) -> tuple[np.ndarray, np.ndarray]:
         """Force [N] and torque about the body's origin [N m] of the cloth, world axes."""
@@ -333,7 +356,7 @@ class Sim(_Owner):
         self, tolerance: float = 0.0, budget: int = 0, rings: int = 0
     ) -> tuple[np.ndarray, Suggestion]:
         """Where yarns would change the answer, from the present state of triangles alone: `alpha` of each
-        vertex, shape (vertices,), for :meth:`Garment.set_blend_vertices`, and what it leaves and costs. At least
+        vertex, shape (vertices,), for :meth:`set_blend_vertices`, here or of a garment, and what it leaves and costs. At least
         one of `tolerance`, the error around a vertex above which triangles give way, and `budget`, the most nodes
         of yarns as predicted."""
         if not 0 <= budget < 2**64:

@@ -11,7 +11,7 @@
 //! everything is enriched, for tests, full triangles too have a filter over their vertices, which have no energies.
 
 use super::coupling::{Coupling, Joined};
-use super::cover::{Cover, Places, in_part};
+use super::cover::{Cover, Places, in_part, laid_passages};
 use super::filter::{Filter, Parts};
 use super::region::Region;
 use super::riders::{Rider, Riders};
@@ -93,7 +93,7 @@ pub fn join(
         1.0 - blended_weight(&alpha).min(1.0 - YarnMesh::LEAST_ALPHA)
     };
     let own: Vec<f64> = (0..count).map(part).collect();
-    let (yarns, nodes, _) = laid.part(&inside);
+    let (yarns, nodes, numbers) = laid.part(&inside);
     let first = mesh.uv.len() as u32;
     let riders = Riders::new(in_part(list, &nodes, first))?;
     let enriched = |t: usize| region.hybrid[t] || (options.everywhere && region.full[t]);
@@ -143,6 +143,8 @@ pub fn join(
             .map(|t| cover.mass(t).filter(|_| !region.full[t]))
             .collect(),
         yarns,
+        nodes,
+        passages: laid_passages(&numbers),
         coupling: Coupling { riders, filter },
     })
 }

@@ -20,6 +20,10 @@ pub struct Coupling {
 pub struct Joined {
     /// The yarns.
     pub yarns: YarnMesh,
+    /// Number that each of their nodes has in the yarns of whole panels.
+    pub nodes: Vec<u32>,
+    /// And each of their passages.
+    pub passages: Vec<u32>,
     /// What joins them, by points (vertices, then nodes).
     pub coupling: Coupling,
     /// Part of the membrane of each triangle of the whole mesh that is its own, along weft and warp.

@@ -98,6 +98,12 @@ pub(super) fn in_part(list: Vec<Rider>, nodes: &[u32], first: u32) -> Vec<Rider>
     riders
 }
 
+/// Laid numbers of a part's passages, from the numbers that laid passages have in the part.
+pub(super) fn laid_passages(numbers: &[u32]) -> Vec<u32> {
+    let there = (0..).zip(numbers).filter(|(_, n)| **n != u32::MAX);
+    there.map(|(laid, _)| laid).collect()
+}
+
 /// Mass of yarn [kg] in a triangle: all, and weighted along weft and warp.
 #[derive(Clone, Copy, Default)]
 struct Amount {

@@ -15,7 +15,7 @@
 //! triangles rides on the edge of the triangles; where both sides are yarns it is free.
 
 use super::coupling::{Coupling, Joined};
-use super::cover::{Cover, Places, in_part};
+use super::cover::{Cover, Places, in_part, laid_passages};
 use super::riders::Riders;
 use crate::error::Result;
 use crate::pattern::Garment;
@@ -47,14 +47,18 @@ pub fn join(
         ..Joined::default()
     };
     if inside.iter().all(|i| *i) && list.is_empty() {
+        joined.nodes = (0..laid.uv.len() as u32).collect();
+        joined.passages = (0..laid.incidences.len() as u32).collect();
         joined.yarns = laid;
         return Ok(joined);
     }
-    let (yarns, nodes, _) = laid.part(&inside);
+    let (yarns, nodes, numbers) = laid.part(&inside);
     joined.yarns = yarns;
+    joined.passages = laid_passages(&numbers);
     joined.coupling = Coupling {
         riders: Riders::new(in_part(list, &nodes, mesh.uv.len() as u32))?,
         filter: None,
     };
+    joined.nodes = nodes;
     Ok(joined)
 }

@@ -21,6 +21,8 @@ use crate::math::Vec3;
 const NONE: u32 = u32::MAX;
 /// Most columns of `E`, supported or not: their choice takes dense algebra.
 const MOST: usize = 1500;
+/// Violation of a constraint over what it sums that steps may leave.
+const ROUND_OFF: f64 = 1e-9;
 /// Largest row sum of `|B^+|`.
 pub const AMPLIFICATION: f64 = 30.0;
 
@@ -272,6 +274,38 @@ impl Filter {
                 values[*v as usize] += r;
             }
         }
+    }
+
+    /// Lets the constraints hold where they do not: vertices that are `free` or have nothing of their own go to the nodes first,
+    /// `v <- B^+ p`, nodes follow the others. Nothing moves where round-off alone breaks them.
+    pub fn settle(&self, values: &mut [Vec3], free: impl Fn(u32) -> bool) {
+        let r = self.excess(values);
+        let goes = |v: u32| free(v) || self.bare.binary_search(&v).is_ok();
+        for (v, r) in self.kept.iter().zip(&r).filter(|(v, _)| goes(**v)) {
+            values[*v as usize] += r;
+        }
+        let r = self.excess(values);
+        if self.bare.is_empty() {
+            self.subtract(&r, values);
+        }
+    }
+
+    /// `G^-1 E^T (p - B v)`, zero where that is round-off.
+    fn excess(&self, values: &[Vec3]) -> Vec<Vec3> {
+        let mut sizes = vec![0.0; self.width];
+        for (i, node) in self.nodes.iter().enumerate() {
+            for (column, e) in self.entries(i) {
+                sizes[column] += e.abs() * values[node.point as usize].norm();
+            }
+        }
+        let mut r = self.collect(|i| self.beside(i, values));
+        for (r, size) in r.iter_mut().zip(&sizes) {
+            if r.norm() <= ROUND_OFF * size {
+                *r = Vec3::zeros();
+            }
+        }
+        self.factor.solve(&mut r);
+        r
     }
 
     /// `p -= E r`.

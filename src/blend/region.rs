@@ -1,8 +1,8 @@
 //! Which triangles give way to yarns.
 //!
-//! A vertex is in the region if a polygon of its panel holds it, within a millionth of the panel's size; a
+//! A vertex is in the region if a shape of its panel ([`crate::pattern::blend_region`]) holds it, within a millionth of the panel's size; a
 //! triangle is if its three vertices are. So the region is as fine as the triangles: a polygon that holds none is
-//! refused, and between polygons that meet within a triangle there is no gap.
+//! refused, and between shapes that meet within a triangle there is no gap.
 //!
 //! Around full triangles may lie rings in which both models act. With `w` rings a vertex that is `k` rings away from
 //! the nearest full triangle has `alpha = 1 - k/w`; `alpha` is linear in the triangles of the rings, 1 in full
@@ -10,7 +10,6 @@
 
 use crate::error::{Error, Result};
 use crate::math::Vec2;
-use crate::pattern::outline::{Piece, inside, point_distance};
 use crate::pattern::{BlendRegion, Garment};
 use crate::tri::GarmentMesh;
 
@@ -47,9 +46,9 @@ impl Region {
             }
             let [low, high] = panel.bounds()?.unwrap_or([Vec2::zeros(); 2]);
             let tolerance = TOLERANCE * (high - low).norm();
-            let polygon = sides(region);
+            let holds = region.holds(panel, tolerance)?;
             for vertex in vertices(mesh, region) {
-                within[vertex] = within[vertex] || holds(&polygon, mesh.uv[vertex], tolerance);
+                within[vertex] = within[vertex] || holds(mesh.uv[vertex]);
             }
         }
         let full: Vec<bool> = mesh
@@ -153,24 +152,4 @@ fn place(region: usize) -> String {
 fn vertices(mesh: &GarmentMesh, region: &BlendRegion) -> std::ops::Range<usize> {
     let panel = region.panel as usize;
     mesh.panel_starts[panel] as usize..mesh.panel_starts[panel + 1] as usize
-}
-
-fn sides(region: &BlendRegion) -> Vec<Piece> {
-    let n = region.polygon.len();
-    (0..n)
-        .map(|i| Piece {
-            a: region.polygon[i],
-            b: region.polygon[(i + 1) % n],
-            edge: i,
-            ring: 0,
-            next: (i + 1) % n,
-        })
-        .collect()
-}
-
-fn holds(polygon: &[Piece], p: Vec2, tolerance: f64) -> bool {
-    inside(p, polygon, 0)
-        || polygon
-            .iter()
-            .any(|piece| point_distance(p, piece.a, piece.b) <= tolerance)
 }

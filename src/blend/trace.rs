@@ -8,7 +8,7 @@
 use super::region::check_rings;
 use crate::error::{Error, Result};
 use crate::math::topology;
-use crate::pattern::BlendRegion;
+use crate::pattern::{BlendRegion, Shape};
 use crate::tri::GarmentMesh;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -52,7 +52,7 @@ pub fn polygons(mesh: &GarmentMesh, full: &[bool], rings: u32) -> Vec<BlendRegio
         let polygon = polygon(mesh, &piece);
         regions.push(BlendRegion {
             panel,
-            polygon: polygon.iter().map(|v| mesh.uv[*v as usize]).collect(),
+            shape: Shape::Polygon(polygon.iter().map(|v| mesh.uv[*v as usize]).collect()),
             rings,
         });
     }

@@ -12,7 +12,7 @@ use super::types::{toile_garment, toile_garment_desc, toile_panel_desc, toile_se
 use crate::blend::trace;
 use crate::error::{Error, Result};
 use crate::math::Vec2;
-use crate::pattern::{BlendRegion, EdgeRef, Fabric, Garment, Panel, Seam, import};
+use crate::pattern::{BlendRegion, EdgeRef, Fabric, Garment, Panel, Seam, Shape, import};
 use crate::tri::triangulate;
 use std::ffi::c_char;
 use std::ptr;
@@ -280,14 +280,20 @@ pub unsafe extern "C" fn toile_garment_set_panel_fabric(
     })
 }
 
-/// Reads a polygon of a panel; both garments and simulations have this call.
-pub(super) fn region(
+/// The garment's regions with a polygon in the place of a panel's, none without corners; both garments and simulations have this
+/// call.
+pub(super) fn regions_with(
     garment: &Garment,
     panel: u32,
     uv: &[[f64; 2]],
     rings: u32,
-) -> Result<BlendRegion> {
+) -> Result<Vec<BlendRegion>> {
     let name = &panel_of(garment, panel)?.name;
+    let others = garment.blend_regions.iter().filter(|r| r.panel != panel);
+    let mut regions: Vec<BlendRegion> = others.cloned().collect();
+    if uv.is_empty() {
+        return Ok(regions);
+    }
     if uv.len() < 3 {
         return Err(Error::geometry(format!(
             "blend region of panel '{name}': {} corners are no polygon",
@@ -299,11 +305,12 @@ pub(super) fn region(
             "blend region of panel '{name}': {rings} rings are above the limit of 1000"
         )));
     }
-    Ok(BlendRegion {
+    regions.push(BlendRegion {
         panel,
-        polygon: uv.iter().map(|&[u, v]| Vec2::new(u, v)).collect(),
+        shape: Shape::Polygon(uv.iter().map(|&[u, v]| Vec2::new(u, v)).collect()),
         rings,
-    })
+    });
+    Ok(regions)
 }
 
 /// Asks for every yarn inside a polygon of a panel: flat coordinates [m], shape [count, 2], with
@@ -321,14 +328,7 @@ pub unsafe extern "C" fn toile_garment_set_blend_region(
         GARMENTS.get(garment.addr())?;
         let uv = input::points::<2>(uv, count, LARGEST_PANEL, "uv")?;
         edit(garment, |g| {
-            panel_of(g, panel)?;
-            let new = if uv.is_empty() {
-                None
-            } else {
-                Some(region(g, panel, &uv, rings)?)
-            };
-            g.blend_regions.retain(|r| r.panel != panel);
-            g.blend_regions.extend(new);
+            g.blend_regions = regions_with(g, panel, &uv, rings)?;
             Ok(())
         })
     })

@@ -15,7 +15,7 @@
 //!   a slice is made of it, and copied before an object is locked for writing, because it may point
 //!   into that very object (a view).
 //! * one file for each object: [`garment`] (with `panel` and [`garment_readout`]), [`body`], [`sim`]
-//!   (with [`motion`], [`readout`] and [`suggest`]).
+//!   (with [`motion`], [`readout`], [`region`] and [`suggest`]).
 //!
 //! The comments of exported items are the header's text: they are written for C readers, and name
 //! the unit and the shape of every array.
@@ -47,6 +47,7 @@ pub mod garment;
 pub mod garment_readout;
 pub mod motion;
 pub mod readout;
+pub mod region;
 pub mod sim;
 pub mod status;
 pub mod suggest;
@@ -59,6 +60,7 @@ pub use garment::*;
 pub use garment_readout::*;
 pub use motion::*;
 pub use readout::*;
+pub use region::*;
 pub use sim::*;
 pub use status::*;
 pub use suggest::*;

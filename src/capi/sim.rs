@@ -12,7 +12,7 @@ use super::motion::Watcher;
 use super::output;
 use super::status::toile_status;
 use super::types::{toile_body, toile_contact_desc, toile_garment, toile_sim, toile_sim_desc};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::sim::{ContactSettings, Settings, Sim, SimOptions};
 use crate::sim_scene;
 use std::ffi::c_char;
@@ -76,7 +76,7 @@ pub(super) fn write<R>(
 }
 
 /// Number of vertices, asked before arrays of the caller are measured against it.
-fn vertex_count(sim: *const toile_sim) -> Result<usize> {
+pub(super) fn vertex_count(sim: *const toile_sim) -> Result<usize> {
     read(sim, |sim| Ok(sim.positions().len()))
 }
 
@@ -170,7 +170,7 @@ pub unsafe extern "C" fn toile_sim_from_scene(
     })
 }
 
-/// The garment that the simulation was made of, as a new handle; free it with toile_garment_free.
+/// The garment that the simulation was made of, with its present regions of yarns, as a new handle; free it with toile_garment_free.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn toile_sim_garment(
     sim: *const toile_sim,
@@ -285,43 +285,6 @@ pub unsafe extern "C" fn toile_sim_unpin(
         let limit = vertex_count(sim)?;
         let vertices = input::array(vertices, count, limit, "vertices")?.to_vec();
         write(sim, |sim, _| sim.unpin(&vertices))
-    })
-}
-
-/// Moves the region in which every yarn is simulated, with the state carried over: a polygon of a
-/// panel in flat coordinates [m], shape [count, 2], and `rings` hybrid rings around it. A count of 0
-/// takes the region away. TOILE_E_UNSUPPORTED: this version takes regions only when the simulation is
-/// made; a count of 0 on a panel without yarns is fine.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn toile_sim_set_blend_region(
-    sim: *mut toile_sim,
-    panel: u32,
-    uv: *const f64,
-    count: usize,
-    rings: u32,
-) -> toile_status {
-    entry!({
-        SIMS.get(sim.addr())?;
-        let uv = input::points::<2>(uv, count, 1 << 20, "uv")?;
-        write(sim, |sim, _| {
-            let garment = sim.garment();
-            let Some(name) = garment.panels.get(panel as usize).map(|p| &p.name) else {
-                return Err(Error::argument(format!(
-                    "panel {panel} does not exist: the garment has {}",
-                    garment.panels.len()
-                )));
-            };
-            if uv.is_empty() && !garment.blend_regions.iter().any(|r| r.panel == panel) {
-                return Ok(());
-            }
-            if !uv.is_empty() {
-                garment::region(garment, panel, &uv, rings)?;
-            }
-            Err(Error::unsupported(format!(
-                "panel {panel} '{name}': regions of a running simulation do not change in this \
-                 version; set the garment's regions and make the simulation anew"
-            )))
-        })
     })
 }
 

@@ -321,8 +321,8 @@ pub struct toile_system_info {
 pub struct toile_yarn_changes {
     /// sizeof(toile_yarn_changes), set by the caller.
     pub struct_size: usize,
-    /// Grows whenever any of these numbers, or the arrays that count nodes and passages, change. 0 without
-    /// yarns, 1 as laid.
+    /// Grows whenever any of these numbers, or the arrays that count nodes and passages, change, with regions too. 0 before
+    /// there are yarns, 1 as they are laid first.
     pub epoch: u64,
     /// Passages of yarns through nodes that are gone.
     pub passages_gone: u64,

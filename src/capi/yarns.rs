@@ -160,8 +160,8 @@ pub unsafe extern "C" fn toile_sim_yarn_forces(
     })
 }
 
-/// What has changed since the yarns were laid: contacts that yarns came out of. `epoch` grows with every step, drape or
-/// restored state that changes it.
+/// What has changed since the yarns were laid: contacts that yarns came out of. `epoch` grows with every step, drape,
+/// restored state or change of regions that changes it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn toile_sim_yarn_changes(
     sim: *const toile_sim,

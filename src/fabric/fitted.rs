@@ -30,13 +30,32 @@ pub fn fitted<'a>(garment: &'a Garment, settings: &Settings) -> Result<Cow<'a, G
         let named = |e: Error| e.at(format!("fabric '{}'", fabric.name));
         let find = || fit(yarns, &Range::of(yarns), settings);
         let found = KNOWN.of(yarns, settings, find).map_err(named)?;
-        let laid = |r: &crate::pattern::BlendRegion| garment.panels[r.panel as usize].fabric == k;
-        if garment.blend_regions.iter().any(laid) {
+        if is_laid(garment, k) {
             fits(yarns, &found).map_err(named)?;
         }
         out.to_mut().fabrics[k] = found.fabric(fabric);
     }
     Ok(out)
+}
+
+/// Refuses regions of yarns in a garment that was fitted with these settings, where the yarns are not at rest as they are laid.
+pub fn check_regions(garment: &Garment, settings: &Settings) -> Result<()> {
+    for (k, fabric) in garment.fabrics.iter().enumerate() {
+        if let (true, Some(yarns)) = (fabric.fitted && is_laid(garment, k), &fabric.yarns) {
+            let find = || fit(yarns, &Range::of(yarns), settings);
+            (KNOWN
+                .of(yarns, settings, find)
+                .and_then(|found| fits(yarns, &found)))
+            .map_err(|e| e.at(format!("fabric '{}'", fabric.name)))?;
+        }
+    }
+    Ok(())
+}
+
+fn is_laid(garment: &Garment, fabric: usize) -> bool {
+    let list = garment.blend_regions.iter();
+    let mut fabrics = list.map(|r| garment.panels[r.panel as usize].fabric);
+    fabrics.any(|f| f == fabric)
 }
 
 /// Refuses yarns that are not at rest as they are laid.

@@ -5,7 +5,7 @@
 
 use super::curve::Curve;
 use super::outline::{Piece, first_contact, inside, polylines};
-use super::{BlendRegion, Garment, Panel, Seam};
+use super::{BlendRegion, Garment, Panel, Seam, Shape};
 use crate::error::{Error, Result};
 use crate::math::Vec2;
 use std::collections::BTreeMap;
@@ -188,16 +188,36 @@ impl Garment {
                 self.panels.len()
             )));
         }
-        if region.polygon.len() < 3 {
-            return Err(Error::geometry(format!(
-                "blend region {k}: {} corners, at least 3 needed",
-                region.polygon.len()
-            )));
+        let place = |e: Error| e.at(format!("blend region {k}"));
+        match &region.shape {
+            Shape::Polygon(corners) => {
+                if corners.len() < 3 {
+                    return Err(Error::geometry(format!(
+                        "blend region {k}: {} corners, at least 3 needed",
+                        corners.len()
+                    )));
+                }
+                for (corner, p) in corners.iter().enumerate() {
+                    check_point(p)
+                        .map_err(|e| e.at(format!("blend region {k} corner {corner}")))?;
+                }
+                Ok(())
+            }
+            Shape::Disc { center, radius } => check_point(center)
+                .and_then(|()| check_reach("radius", *radius))
+                .map_err(place),
+            Shape::Edge { edge, width } => {
+                let panel = &self.panels[region.panel as usize];
+                if *edge as usize >= panel.edge_count() {
+                    return Err(Error::geometry(format!(
+                        "blend region {k}: edge {edge} of {} of panel '{}'",
+                        panel.edge_count(),
+                        panel.name
+                    )));
+                }
+                check_reach("width", *width).map_err(place)
+            }
         }
-        for (corner, p) in region.polygon.iter().enumerate() {
-            check_point(p).map_err(|e| e.at(format!("blend region {k} corner {corner}")))?;
-        }
-        Ok(())
     }
 }
 
@@ -205,6 +225,15 @@ fn check_edge_length(place: &str, h: f64) -> Result<()> {
     if !h.is_finite() || h <= 0.0 {
         return Err(Error::geometry(format!(
             "{place}: edge length {h} m must be finite and positive"
+        )));
+    }
+    Ok(())
+}
+
+fn check_reach(what: &str, reach: f64) -> Result<()> {
+    if !(reach > 0.0 && reach <= MAX_COORDINATE) {
+        return Err(Error::geometry(format!(
+            "{what} {reach} m must be positive and within {MAX_COORDINATE} m"
         )));
     }
     Ok(())

@@ -5,6 +5,7 @@
 //! edges (a dart joins two edges of one panel). World placement is a rigid motion of the plane
 //! `z = 0`.
 
+pub mod blend_region;
 pub mod chart;
 pub mod check;
 pub mod curve;
@@ -16,6 +17,7 @@ pub mod outline;
 pub mod ridge;
 pub mod yarn_fabric;
 
+pub use blend_region::{BlendRegion, Shape};
 pub use fabric::{BendingModel, Fabric};
 pub use ridge::Ridge;
 pub use yarn_fabric::YarnFabric;
@@ -117,17 +119,6 @@ pub struct Seam {
     pub same_direction: bool,
     /// Rest angle across the seam [rad]; 0 is flat.
     pub rest_angle: f64,
-}
-
-/// A polygon on a panel inside which every yarn is simulated.
-#[derive(Clone, Debug, PartialEq)]
-pub struct BlendRegion {
-    /// Panel index.
-    pub panel: u32,
-    /// Polygon in flat coordinates [m].
-    pub polygon: Vec<Vec2>,
-    /// Hybrid rings around it.
-    pub rings: u32,
 }
 
 impl Panel {

@@ -23,7 +23,7 @@ pub use rivals::rivals;
 use crate::blend::embed::carried;
 use crate::error::{Error, Result};
 use crate::math::{Mat3, Vec2, Vec3};
-use crate::pattern::{BlendRegion, Garment};
+use crate::pattern::{BlendRegion, Garment, Shape};
 use crate::scene::Scene;
 use crate::sim::{DrapeOptions, Outcome, Sim};
 use crate::sim_scene::build;
@@ -215,11 +215,7 @@ fn models(garment: &Garment) -> Result<Vec<(String, Kind, Garment)>> {
     for scale in REGIONS {
         let mut g = garment.clone();
         for region in &mut g.blend_regions {
-            let middle: Vec2 =
-                region.polygon.iter().sum::<Vec2>() / region.polygon.len().max(1) as f64;
-            for p in &mut region.polygon {
-                *p = middle + (*p - middle) * scale;
-            }
+            *region = region.scaled(scale);
         }
         list.push((format!("mixed, regions x {scale}"), Kind::Mixed, g));
     }
@@ -241,12 +237,12 @@ fn whole(garment: &Garment, panels: Vec<u32>) -> Result<Garment> {
         let (low, high) = (low - room, high + room);
         g.blend_regions.push(BlendRegion {
             panel,
-            polygon: vec![
+            shape: Shape::Polygon(vec![
                 low,
                 Vec2::new(high.x, low.y),
                 high,
                 Vec2::new(low.x, high.y),
-            ],
+            ]),
             rings: 0,
         });
     }

@@ -128,7 +128,7 @@ impl Sim {
         }
     }
 
-    fn name(&self, point: u32) -> String {
+    pub(super) fn name(&self, point: u32) -> String {
         match point.checked_sub(self.mesh.uv.len() as u32) {
             None => format!("vertex {point}"),
             Some(node) => format!("yarn node {node}"),

@@ -180,7 +180,7 @@ impl Sim {
             let made = |s: &Settings| [s.blend_means, s.blend_enrich].map(f64::to_bits);
             if self.yarns.is_some() && made(&settings) != made(&self.settings) {
                 return Err(Error::state(format!(
-                    "{name} is taken when a simulation is made, and this one has yarns already"
+                    "{name} is taken when yarns come in, and there are some already"
                 )));
             }
             self.engine().set_settings(&settings)?;

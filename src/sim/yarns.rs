@@ -2,7 +2,7 @@
 
 use super::Sim;
 use crate::blend::blended::{self, BlendOptions};
-use crate::blend::embed::carried;
+use crate::blend::embed::carried_along;
 use crate::blend::{Coupling, Filter, Follow, Joined, Region, direct};
 use crate::cloth::Cloth;
 use crate::error::{Error, Result};
@@ -15,7 +15,7 @@ use crate::system::state::State;
 use crate::system::yarn::friction::loose;
 use crate::tri::GarmentMesh;
 use crate::yarn::layout::Layout;
-use crate::yarn::{Incidence, Topology, YarnMaterial, YarnMesh, Yarns, lay};
+use crate::yarn::{Incidence, Names, Topology, YarnMaterial, YarnMesh, Yarns, lay};
 use std::sync::{Arc, PoisonError};
 
 /// Yarns, what they ride on, and the vertices that they carry.
@@ -23,9 +23,9 @@ pub(super) struct YarnPart {
     /// Yarns as they pass their nodes now.
     pub(super) now: Arc<Yarns>,
     /// What is not as laid, in `now`.
-    topology: Topology,
-    /// Grows whenever `now` changes.
-    epoch: u64,
+    pub(super) topology: Topology,
+    /// What the laid nodes and passages are called.
+    pub(super) names: Names,
     /// What joins them to the triangles.
     pub(super) coupling: Coupling,
     /// Triangles that the yarns stand for.
@@ -37,11 +37,13 @@ pub(super) struct YarnPart {
 }
 
 impl YarnPart {
-    /// Lays the yarns of the triangles that the garment's blend regions hold.
+    /// Lays the yarns of the triangles that the garment's blend regions hold; `found` are the settings that fabrics are
+    /// found with.
     pub(super) fn new(
         garment: &Garment,
         mesh: &GarmentMesh,
         settings: &Settings,
+        found: &Settings,
     ) -> Result<Option<Self>> {
         let region = Region::new(garment, mesh)?;
         let left_out = region.full.clone();
@@ -56,13 +58,14 @@ impl YarnPart {
         }
         let used =
             |fabric: usize| (wanted.iter()).any(|p| garment.panels[*p as usize].fabric == fabric);
-        let cells = cells(garment, used, settings)?;
+        let cells = cells(garment, used, found)?;
         let layout = Layout {
             panels: Some(&wanted),
             cells: &cells,
             max_nodes: settings.max_yarn_nodes as usize,
         };
         let laid = lay(garment, &layout)?;
+        let names = laid.names();
         let materials: Vec<YarnMaterial> = garment
             .fabrics
             .iter()
@@ -79,6 +82,8 @@ impl YarnPart {
         };
         let Joined {
             yarns,
+            nodes,
+            passages,
             coupling,
             share,
             own,
@@ -102,7 +107,7 @@ impl YarnPart {
         Ok(Some(Self {
             now: Arc::new(Yarns::laid(yarns, materials)),
             topology: Topology::default(),
-            epoch: 1,
+            names: names.part(&nodes, &passages),
             coupling,
             left_out,
             share,
@@ -159,13 +164,31 @@ impl YarnPart {
     /// Puts the nodes where the vertices say.
     pub(super) fn take(&self, mesh: &GarmentMesh, state: &mut State) -> Result<()> {
         let first = mesh.uv.len();
-        for values in [&mut state.positions, &mut state.velocities] {
-            let nodes = carried(mesh, &values[..first], &self.now.mesh)?;
+        let [x, v] = [&state.positions[..first], &state.velocities[..first]];
+        let (places, rates) = carried_along(mesh, x, v, &self.now.mesh)?;
+        for (values, nodes) in [
+            (&mut state.positions, places),
+            (&mut state.velocities, rates),
+        ] {
             values.truncate(first);
             values.extend(nodes);
             self.coupling.carry(values);
         }
         Ok(())
+    }
+
+    /// Whether hosts may hold a point; nodes are counted on after `first`.
+    pub(super) fn lets_hold(&self, point: u32, first: u32) -> bool {
+        let Some(node) = point.checked_sub(first) else {
+            return !self.follows(point);
+        };
+        let placed = self
+            .coupling
+            .filter
+            .as_ref()
+            .is_some_and(|f| f.places(point));
+        let passed = !self.now.mesh.stack(node as usize).is_empty();
+        passed && !placed && !self.coupling.riders.rides(point)
     }
 
     /// Whether a vertex follows.
@@ -295,10 +318,10 @@ impl Sim {
         nodes.map(|n| !rides(n)).collect()
     }
 
-    /// Grows whenever yarns have left contacts, or have come back to them with an earlier state: the numbers of
-    /// passages change then, and nodes come in. 0 without yarns.
+    /// Grows whenever yarns have left contacts, or have come back to them with an earlier state, and when regions change: the
+    /// numbers of passages change then, and nodes come in. 0 where there never were yarns.
     pub fn yarn_epoch(&self) -> u64 {
-        self.yarns.as_ref().map_or(0, |part| part.epoch)
+        self.yarn_epoch
     }
 
     /// Numbers of what has changed since the yarns were laid.
@@ -327,7 +350,7 @@ impl Sim {
                 part.now = now.clone();
             }
             part.topology.clone_from(&self.state.topology);
-            part.epoch += 1;
+            self.yarn_epoch += 1;
         }
         Ok(())
     }

@@ -140,9 +140,9 @@ settings! {
     yarn_relative_velocity: "yarn.relative_velocity" = 1e-3, 0.0, 0.5, "1";
     /// Inertia forces of yarn that slides: 1 on, 0 off.
     yarn_inertia: "yarn.inertia_forces" = 1.0, 0.0, 1.0, "1" whole;
-    /// In hybrid rings, whether the mean displacement of the nodes beside each triangle is held at zero: 1 yes, 0 no. Taken when a simulation is made.
+    /// In hybrid rings, whether the mean displacement of the nodes beside each triangle is held at zero: 1 yes, 0 no. Taken when yarns come in.
     blend_means: "blend.means" = 0.0, 0.0, 1.0, "1" whole;
-    /// Whether yarns are enriched by triangles where they are alone too, which changes nothing but the work: 1 yes, for tests, 0 no. Taken when a simulation is made.
+    /// Whether yarns are enriched by triangles where they are alone too, which changes nothing but the work: 1 yes, for tests, 0 no. Taken when yarns come in.
     blend_enrich: "blend.enrich_everywhere" = 0.0, 0.0, 1.0, "1" whole;
     /// Quadratic drag of the air along the normal, times density of air.
     air_drag: "air.drag" = 1.2, 0.0, 1e3, "kg/m^3";

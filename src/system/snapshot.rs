@@ -10,7 +10,7 @@ use crate::cloth::Cloth;
 use crate::error::{Error, Result};
 use crate::math::Vec3;
 use crate::math::hash::Hash;
-use crate::pattern::BlendRegion;
+use crate::pattern::{BlendRegion, Shape};
 use serde::{Deserialize, Serialize};
 
 const MAGIC: &[u8; 8] = b"TOILESNP";
@@ -113,8 +113,21 @@ pub fn fingerprint(cloth: &Cloth, regions: &[BlendRegion]) -> u64 {
     for region in regions {
         hash.add(&region.panel.to_le_bytes());
         hash.add(&region.rings.to_le_bytes());
-        for p in &region.polygon {
-            hash.numbers([p.x, p.y]);
+        match &region.shape {
+            Shape::Polygon(corners) => {
+                for p in corners {
+                    hash.numbers([p.x, p.y]);
+                }
+            }
+            Shape::Disc { center, radius } => {
+                hash.add(b"disc");
+                hash.numbers([center.x, center.y, *radius]);
+            }
+            Shape::Edge { edge, width } => {
+                hash.add(b"edge");
+                hash.add(&edge.to_le_bytes());
+                hash.numbers([*width]);
+            }
         }
     }
     hash.value()
@@ -180,7 +193,8 @@ pub fn read(bytes: &[u8], own: &Origin, like: &State) -> Result<State> {
     Ok(state)
 }
 
-fn check(state: &State, like: &State) -> std::result::Result<(), String> {
+/// Refuses a state that does not fit `like`, a state of the simulation that is to take it.
+pub fn check(state: &State, like: &State) -> std::result::Result<(), String> {
     // what the topology of either has added or taken
     let (own, other) = (&like.topology, &state.topology);
     let [n, nodes] = [like.positions.len(), like.yarn_normals.len()]

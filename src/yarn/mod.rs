@@ -11,6 +11,7 @@ mod cut;
 mod knit;
 pub mod layout;
 pub mod material;
+pub mod names;
 pub mod part;
 pub mod periodic;
 mod piece;
@@ -22,6 +23,7 @@ mod weave;
 
 pub use layout::{Cell, Layout, lay};
 pub use material::YarnMaterial;
+pub use names::Names;
 pub use topology::Topology;
 
 use crate::math::Vec2;

@@ -25,6 +25,33 @@ impl Topology {
     pub fn gone(&self) -> usize {
         self.changed.iter().filter(|c| c.1.is_none()).count()
     }
+
+    /// The same in another part of the yarns: `passage` gives the number there of a laid passage whose node is whole there,
+    /// `node` that of a laid node, likewise. `counts` of laid nodes here and there. A passage that is elsewhere than laid, or its
+    /// node, and is not whole there is given back.
+    pub fn in_part(
+        &self,
+        counts: [usize; 2],
+        passage: impl Fn(u32) -> Option<u32>,
+        node: impl Fn(u32) -> Option<u32>,
+    ) -> std::result::Result<Self, u32> {
+        let place = |n: u32| match (n as usize).checked_sub(counts[0]) {
+            Some(split) => Some((counts[1] + split) as u32),
+            None => node(n),
+        };
+        let mut changed = Vec::with_capacity(self.changed.len());
+        for (i, n) in &self.changed {
+            let there = match n {
+                Some(n) => place(*n).map(Some),
+                None => Some(None),
+            };
+            changed.push((passage(*i).ok_or(*i)?, there.ok_or(*i)?));
+        }
+        changed.sort_unstable();
+        // each of them has a passage in it
+        let split = self.split.iter().filter_map(|n| node(*n)).collect();
+        Ok(Self { changed, split })
+    }
 }
 
 impl Yarns {

@@ -42,7 +42,7 @@ pub fn has(program: &str) -> bool {
 }
 
 /// Source files of the C interface in the order of the header.
-pub const SOURCES: [&str; 12] = [
+pub const SOURCES: [&str; 13] = [
     "status.rs",
     "log.rs",
     "types.rs",
@@ -54,6 +54,7 @@ pub const SOURCES: [&str; 12] = [
     "readout.rs",
     "yarns.rs",
     "suggest.rs",
+    "region.rs",
     "array.rs",
 ];
 

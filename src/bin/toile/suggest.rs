@@ -66,14 +66,9 @@ pub(crate) fn suggest(args: &SuggestArgs) -> Done {
         blend_regions: found.regions.clone(),
         ..scene.garment.clone()
     };
+    let regions = toile::pattern::export::blend_regions(&garment)?;
     let garment = toile::pattern::export::garment_to_json(&garment)?;
     file(&dir.join("garment.json"), garment.as_bytes())?;
-    let regions: Vec<_> = (found.regions.iter())
-        .map(|r| {
-            let polygon: Vec<[f64; 2]> = r.polygon.iter().map(|p| (*p).into()).collect();
-            json!({"panel": scene.garment.panels[r.panel as usize].name, "polygon": polygon, "rings": r.rings})
-        })
-        .collect();
     let region = json!({
         "blend_regions": regions,
         "tolerance": found.tolerance,

@@ -9,7 +9,9 @@ use crate::pattern::chart::Notation;
 use crate::pattern::curve::Curve;
 use crate::pattern::import::json::VERSION;
 use crate::pattern::yarn_fabric::Structure;
-use crate::pattern::{BendingModel, Edge, Fabric, Garment, Panel, Placement, Ridge, YarnFabric};
+use crate::pattern::{
+    BendingModel, BlendRegion, Edge, Fabric, Garment, Panel, Placement, Ridge, Shape, YarnFabric,
+};
 use serde_json::{Map, Value, json};
 use std::fmt::Write as _;
 
@@ -26,14 +28,7 @@ pub fn garment_to_json(garment: &Garment) -> Result<String> {
     root.insert("fabrics".into(), fabrics.collect::<Result<Value>>()?);
     let panels = garment.panels.iter().map(|p| panel_value(garment, p));
     root.insert("panels".into(), panels.collect::<Result<Value>>()?);
-    let name = |panel: u32| -> Value {
-        match garment.panels.get(panel as usize) {
-            Some(p) if garment.panels.iter().filter(|q| q.name == p.name).count() == 1 => {
-                json!(p.name)
-            }
-            _ => json!(panel),
-        }
-    };
+    let name = |panel| panel_name(garment, panel);
     let mut seams = Vec::new();
     for seam in &garment.seams {
         let mut value = Map::new();
@@ -47,17 +42,43 @@ pub fn garment_to_json(garment: &Garment) -> Result<String> {
     }
     root.insert("seams".into(), Value::Array(seams));
     if !garment.blend_regions.is_empty() {
-        let mut regions = Vec::new();
-        for region in &garment.blend_regions {
-            regions.push(json!({
-                "panel": name(region.panel),
-                "polygon": points(&region.polygon)?,
-                "rings": region.rings,
-            }));
-        }
-        root.insert("blend_regions".into(), Value::Array(regions));
+        root.insert("blend_regions".into(), blend_regions(garment)?);
     }
     Ok(text(&Value::Object(root)))
+}
+
+/// The list of the garment's blend regions.
+pub fn blend_regions(garment: &Garment) -> Result<Value> {
+    let value = |region: &BlendRegion| -> Result<Value> {
+        let mut value = Map::new();
+        value.insert("panel".into(), panel_name(garment, region.panel));
+        match &region.shape {
+            Shape::Polygon(corners) => {
+                value.insert("polygon".into(), points(corners)?);
+            }
+            Shape::Disc { center, radius } => {
+                let disc = json!({"center": point(center)?, "radius": number(*radius)?});
+                value.insert("disc".into(), disc);
+            }
+            Shape::Edge { edge, width } => {
+                value.insert("edge".into(), json!(edge));
+                value.insert("width".into(), number(*width)?);
+            }
+        }
+        value.insert("rings".into(), json!(region.rings));
+        Ok(Value::Object(value))
+    };
+    garment.blend_regions.iter().map(value).collect()
+}
+
+/// A panel by its name, if that is its own.
+fn panel_name(garment: &Garment, panel: u32) -> Value {
+    match garment.panels.get(panel as usize) {
+        Some(p) if garment.panels.iter().filter(|q| q.name == p.name).count() == 1 => {
+            json!(p.name)
+        }
+        _ => json!(panel),
+    }
 }
 
 /// One fabric as JSON text.

@@ -7,7 +7,7 @@ use super::schema;
 use crate::error::{Error, Result};
 use crate::math::Rotation;
 use crate::pattern::curve::Curve;
-use crate::pattern::{BlendRegion, Edge, EdgeRef, Fabric, Garment, Panel, Placement, Seam};
+use crate::pattern::{BlendRegion, Edge, EdgeRef, Fabric, Garment, Panel, Placement, Seam, Shape};
 use nalgebra::Quaternion;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -108,8 +108,8 @@ pub fn read_garment(
     for node in list(garment, "blend_regions", problems) {
         let region = node
             .object()
-            .and_then(|o| read_blend_region(&o, &panel_names));
-        blend_regions.extend(keep(problems, region));
+            .and_then(|o| read_blend_regions(&o, &panel_names, &seams));
+        blend_regions.extend(keep(problems, region).into_iter().flatten());
     }
     let name = garment
         .get("name")
@@ -346,16 +346,71 @@ fn read_seam(seam: &Object<'_>, panels: &Names<'_>) -> Result<Seam> {
     })
 }
 
-fn read_blend_region(region: &Object<'_>, panels: &Names<'_>) -> Result<BlendRegion> {
+/// One region, or one on each side of a seam.
+fn read_blend_regions(
+    region: &Object<'_>,
+    panels: &Names<'_>,
+    seams: &[Seam],
+) -> Result<Vec<BlendRegion>> {
     region.only(schema::BLEND_REGION)?;
-    Ok(BlendRegion {
-        panel: panels.find(&region.need("panel")?)?,
-        polygon: region
-            .need("polygon")?
-            .array()?
-            .iter()
-            .map(Node::vec2)
-            .collect::<Result<_>>()?,
-        rings: region.get("rings").map_or(Ok(0), |node| node.index())?,
-    })
+    let rings = region.get("rings").map_or(Ok(0), |node| node.index())?;
+    let given = |key: &&str| region.get(key).is_some();
+    let shapes: Vec<&str> = (["polygon", "disc", "edge", "seam"].into_iter())
+        .filter(given)
+        .collect();
+    let [shape] = shapes[..] else {
+        return Err(region.error(format!(
+            "one of 'polygon', 'disc', 'edge', 'seam' must be there, not {}",
+            shapes.len()
+        )));
+    };
+    let node = region.need(shape)?;
+    let beside = matches!(shape, "edge" | "seam");
+    if !beside && region.get("width").is_some() {
+        return Err(region.error(format!("'width' has no meaning beside '{shape}'")));
+    }
+    let along = |side: EdgeRef| -> Result<BlendRegion> {
+        Ok(BlendRegion {
+            panel: side.panel,
+            shape: Shape::Edge {
+                edge: side.edge,
+                width: region.need("width")?.number()?,
+            },
+            rings,
+        })
+    };
+    if shape == "seam" {
+        let index = node.index()?;
+        let Some(seam) = seams.get(index as usize) else {
+            return Err(node.error(format!("seam {index} of {}", seams.len())));
+        };
+        if region.get("panel").is_some() {
+            return Err(region.error("'panel' has no meaning beside 'seam'"));
+        }
+        return [seam.a, seam.b].into_iter().map(along).collect();
+    }
+    let panel = panels.find(&region.need("panel")?)?;
+    let shape = match shape {
+        "edge" => {
+            let edge = node.index()?;
+            return Ok(vec![along(EdgeRef { panel, edge })?]);
+        }
+        "disc" => {
+            let disc = node.object()?;
+            disc.only(schema::DISC)?;
+            Shape::Disc {
+                center: disc.need("center")?.vec2()?,
+                radius: disc.need("radius")?.number()?,
+            }
+        }
+        _ => {
+            let corners = node.array()?;
+            Shape::Polygon(corners.iter().map(Node::vec2).collect::<Result<_>>()?)
+        }
+    };
+    Ok(vec![BlendRegion {
+        panel,
+        shape,
+        rings,
+    }])
 }

@@ -258,17 +258,51 @@ pub const BLEND_REGION: &[Key] = &[
         "panel",
         "text or integer",
         "",
-        "required",
+        "required but for a seam",
         "panel by name or index",
     ),
     key(
         "polygon",
         "array of [u, v]",
         "m",
-        "required",
-        "polygon in flat coordinates",
+        "",
+        "what is inside of a polygon in flat coordinates; or one of the next three",
+    ),
+    key(
+        "disc",
+        "object",
+        "",
+        "",
+        "what is no farther from a point than a radius",
+    ),
+    key(
+        "edge",
+        "integer",
+        "",
+        "",
+        "what is no farther from an edge of the panel than the width",
+    ),
+    key(
+        "seam",
+        "integer",
+        "",
+        "",
+        "the same on both sides of a seam, by its place in the list",
+    ),
+    key(
+        "width",
+        "number",
+        "m",
+        "required there",
+        "how far from the edge",
     ),
     key("rings", "integer", "", "0", "hybrid rings around it"),
+];
+
+/// Keys of a disc.
+pub const DISC: &[Key] = &[
+    key("center", "[u, v]", "m", "required", "in flat coordinates"),
+    key("radius", "number", "m", "required", "how far it goes"),
 ];
 
 /// Keys of a fabric.
@@ -427,6 +461,7 @@ pub const TABLES: &[(&str, &[Key])] = &[
     ("garment.panels[].placement", PLACEMENT),
     ("garment.seams[]", SEAM),
     ("garment.blend_regions[]", BLEND_REGION),
+    ("garment.blend_regions[].disc", DISC),
     ("garment.fabrics[]", FABRIC),
     ("garment.fabrics[].membrane", MEMBRANE),
     ("garment.fabrics[].ridges[]", RIDGE),

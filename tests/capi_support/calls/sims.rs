@@ -67,7 +67,17 @@ pub(super) fn change_sim(world: &World, choices: &mut Choices<'_>) -> toile_stat
     };
     let uv = choices.numbers(8);
     let status = unsafe {
-        match choices.below(16) {
+        match choices.below(17) {
+            16 => {
+                // every corner in, none, or numbers that cannot be
+                let alpha = match choices.below(3) {
+                    0 => vec![1.0; vertices],
+                    1 => vec![0.0; vertices],
+                    _ => choices.numbers(vertices.clamp(1, 300)),
+                };
+                let (count, rings) = (alpha.len(), choices.index());
+                toile_sim_set_blend_vertices(sim, alpha.as_ptr(), count, rings)
+            }
             14 => {
                 let nodes = choices.maybe(pins.as_ptr());
                 toile_sim_pin_yarn_nodes(sim, nodes, choices.count(3), targets)
