@@ -51,6 +51,7 @@ bench-yarn: all
 	$(CARGO) bench --bench yarn
 	$(CARGO) bench --bench yarn_terms
 	$(CARGO) bench --bench yarn_fabrics
+	$(CARGO) bench --bench yarn_garment
 
 bench-mixed: all
 	$(CARGO) bench --bench mixed

@@ -2,12 +2,14 @@
 //!
 //! *Puckering* (Casafranca et al. 2020, figure 4 and table 1): two patches of a plain weave, the one a tenth longer along
 //! the seam, which stretches the other; yarns within a strip along the seam, triangles of 12 pitches beyond. *Dress* (figure 9):
-//! GarmentCode's pencil dress of a weave, draped on a body as triangles; then yarns are laid on the chest, or everywhere. The dress needs
+//! GarmentCode's pencil dress of a weave, draped on a body as triangles; then yarns are laid on the chest, or everywhere. *Shirt* (figure 1):
+//! the same with its shirt and yarns around an armpit. Both need
 //! `TOILE_DATA`. Cloth does not touch itself: yarns of different places do not either. Every model goes from the same places through the same steps of 1 ms, one thread. Printed for each: what it is made of,
 //! Newton and linear iterations a step, processor seconds a step, memory of system and matrix and of the factor, and the
 //! distance of the yarns in the region from those of the full model, over the way these moved (root mean squares).
 //!
-//! `cargo bench --bench mixed`, or `make bench-mixed`; `--quick` takes smaller patches and coarser yarns.
+//! `cargo bench --bench mixed`, or `make bench-mixed`; `--quick` takes smaller patches and coarser yarns, `--only shirt` (or
+//! `dress`, `puckering`) one scene.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -19,11 +21,10 @@ mod common;
 use common::cpu;
 use std::collections::HashMap;
 use std::f64::consts::PI;
-use std::path::PathBuf;
 use toile::body::Body;
 use toile::math::{Vec2, Vec3};
 use toile::pattern::import::garment_from_json;
-use toile::pattern::{BlendRegion, Fabric, Garment, Shape};
+use toile::pattern::{BlendRegion, Garment, Shape};
 use toile::sim::{ContactSettings, DrapeOptions, Settings, Sim, SimOptions};
 
 /// Steps, and what one takes [s].
@@ -292,24 +293,34 @@ fn puckering(side: f64, reach: f64) {
     whole(&scene, &regions);
 }
 
-/// The pencil dress of a weave with this pitch.
-fn dress(pitch: f64) {
-    let Some(data) = std::env::var_os("TOILE_DATA").map(PathBuf::from) else {
-        println!("\nthe dress is left out: TOILE_DATA is not set");
+/// Low and high corner of a region on the panel with this name [m].
+type Part = (&'static str, [f64; 2], [f64; 2]);
+
+/// Of the dress: the two halves of the front, mirrored, on the chest.
+const CHEST: [Part; 2] = [
+    ("left_ftorso", [-0.1, 0.2], [0.12, 0.4]),
+    ("right_ftorso", [-0.12, 0.2], [0.1, 0.4]),
+];
+/// Of the shirt: front, back and both halves of the sleeve around the left armpit.
+const ARMPIT: [Part; 4] = [
+    ("left_ftorso", [0.19, 0.17], [0.4, 0.4]),
+    ("left_btorso", [0.17, 0.17], [0.4, 0.4]),
+    ("left_sleeve_f", [-0.4, -0.4], [-0.15, -0.12]),
+    ("left_sleeve_b", [-0.4, -0.4], [-0.15, -0.12]),
+];
+
+/// A pattern of a weave with this pitch on its body, yarns on some parts of it.
+fn worn(name: &str, pitch: f64, parts: &[Part]) {
+    let Some((mut garment, body)) = common::garment(name) else {
         return;
     };
-    let path = data.join("garmentcode/dress_pencil_specification.json");
-    let text = std::fs::read_to_string(path).expect("pattern");
-    let mut garment = garment_from_json(&text, None).expect("garment");
     let corner = r#"[{"name": "p", "fabric": "y", "vertices": [[0, 0], [1, 0], [0, 1]], "edges": [[0, 1], [1, 2], [2, 0]]}]"#;
-    let fabric: Vec<Fabric> = weave(pitch, corner, "[]").fabrics;
-    garment.fabrics = fabric;
+    garment.fabrics = weave(pitch, corner, "[]").fabrics;
     garment.edge_length = 0.024;
     for panel in &mut garment.panels {
         panel.fabric = 0;
         panel.edge_length = None;
     }
-    let body = Body::obj(&data.join("bodies/mean_all.obj"), 1.0, 0.0).expect("body");
     let placed = Sim::new(&garment, &SimOptions::default()).expect("sim");
     let start = placed.positions().iter().map(|p| (*p).into());
     let mut scene = Scene {
@@ -319,34 +330,31 @@ fn dress(pitch: f64) {
         gravity: [0.0, -9.81, 0.0],
         held: Vec::new(),
     };
-    println!("\ndress: yarns of {pitch} m on the chest");
+    println!("\n{name}: a weave with a pitch of {pitch} m");
     scene.drape();
-    let panel = |name: &str| {
-        let found = scene.garment.panels.iter().position(|p| p.name == name);
-        found.expect("panel") as u32
+    let region = |(panel, low, high): &Part| {
+        let found = scene.garment.panels.iter().position(|p| p.name == *panel);
+        let [low, high] = [low, high].map(|[u, v]| Vec2::new(*u, *v));
+        (found.expect("panel") as u32, rectangle(low, high))
     };
-    // the two halves of the front, mirrored
-    let regions = vec![
-        (
-            panel("left_ftorso"),
-            rectangle(Vec2::new(-0.1, 0.2), Vec2::new(0.12, 0.4)),
-        ),
-        (
-            panel("right_ftorso"),
-            rectangle(Vec2::new(-0.12, 0.2), Vec2::new(0.1, 0.4)),
-        ),
-    ];
-    whole(&scene, &regions);
+    whole(&scene, &parts.iter().map(region).collect());
 }
 
 fn main() {
     let quick = std::env::args().any(|a| a == "--quick");
     println!("{STEPS} steps of {DT} s each, one thread");
-    if quick {
-        puckering(0.1, 0.025);
-        dress(6e-3);
-    } else {
-        puckering(0.342, 0.088);
-        dress(2.5e-3);
+    let only = std::env::args().skip_while(|a| a != "--only").nth(1);
+    let wanted = |name: &str| only.as_deref().is_none_or(|o| o == name);
+    if wanted("puckering") {
+        match quick {
+            true => puckering(0.1, 0.025),
+            false => puckering(0.342, 0.088),
+        }
+    }
+    if wanted("dress") {
+        worn("dress_pencil", if quick { 6e-3 } else { 2.5e-3 }, &CHEST);
+    }
+    if wanted("shirt") {
+        worn("shirt_mean", if quick { 6e-3 } else { 2e-3 }, &ARMPIT);
     }
 }

@@ -174,7 +174,7 @@ fn the_gallery_is_made_of_scenes_that_run() {
         assert!(sim.yarns().is_some(), "{path}");
         scenes += 1;
     }
-    assert!(scenes >= 9, "{scenes}");
+    assert!(scenes >= 16, "{scenes}");
     for entry in std::fs::read_dir(root.join("docs/images")).expect("images") {
         let entry = entry.expect("image");
         let bytes = entry.metadata().expect("size").len();

@@ -82,6 +82,8 @@ mod mixed_patches;
 mod mixed_pucker;
 #[path = "mixed_riders.rs"]
 mod mixed_riders;
+#[path = "mixed_scenes.rs"]
+mod mixed_scenes;
 #[path = "pattern_bytes.rs"]
 mod pattern_bytes;
 #[path = "pattern_check.rs"]
@@ -164,3 +166,5 @@ mod yarn_terms_symmetry;
 mod yarn_topology;
 #[path = "yarn_weave.rs"]
 mod yarn_weave;
+#[path = "yarn_worn.rs"]
+mod yarn_worn;

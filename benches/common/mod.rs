@@ -1,6 +1,23 @@
-//! What several benchmarks need: processor time, random numbers, medians, fitted exponents.
+//! What several benchmarks need: processor time, random numbers, medians, fitted exponents, garments of others.
 
 #![allow(dead_code, reason = "every benchmark uses a part of it")]
+
+use std::path::PathBuf;
+use toile::body::Body;
+use toile::pattern::Garment;
+use toile::pattern::import::garment_from_file;
+
+/// A GarmentCode pattern of the folder that `TOILE_DATA` names, and the body that it is for; `None`, and a line that says so, without.
+pub(crate) fn garment(name: &str) -> Option<(Garment, Body)> {
+    let Some(data) = std::env::var_os("TOILE_DATA").map(PathBuf::from) else {
+        println!("\n{name} is left out: TOILE_DATA is not set");
+        return None;
+    };
+    let path = data.join(format!("garmentcode/{name}_specification.json"));
+    let (garment, _) = garment_from_file(&path).expect("pattern");
+    let body = Body::obj(&data.join("bodies/mean_all.obj"), 1.0, 0.0).expect("body");
+    Some((garment, body))
+}
 
 /// Processor time of all threads of this process [s], in steps of 10 ms.
 pub(crate) fn cpu() -> f64 {
