@@ -379,7 +379,8 @@ impl System {
             .fold(edges, f64::max)
     }
 
-    /// Largest distance between the two points of a seam link or of a yarn end and its rod [m].
+    /// Largest distance between the two points of a seam link or of a yarn end and its rod [m]. Where vertices follow yarns the
+    /// yarns' ends tell.
     pub fn largest_seam_gap(&self, x: &[Vec3]) -> f64 {
         let gap = |point: u32, ends: [u32; 2], t: f64| {
             let [a, b] = ends.map(|v| x[v as usize]);
@@ -387,6 +388,10 @@ impl System {
         };
         let links = self.cloth.mesh.seams.iter().flat_map(|s| &s.links);
         let sewn = links
+            .filter(|l| {
+                let mut points = [l.vertex, l.edge[0], l.edge[1]].into_iter();
+                points.all(|v| self.points.moves(v as usize))
+            })
             .map(|l| gap(l.vertex, l.edge, l.t))
             .fold(0.0, f64::max);
         let node = |n| self.unknowns.node(n);

@@ -193,13 +193,17 @@ fn write(
     let text = obj::to_obj(x, triangles, sim.vertex_uv(), sim.vertex_panels(), &names);
     file(&dir.join("garment.obj"), text.as_bytes())?;
     let mut parts = vec![Part::garment("garment", x, triangles, sim.vertex_panels())];
-    let edges = topology::edges(triangles);
+    let mut edges = topology::edges(triangles);
+    // what follows yarns passes through nothing by itself
+    let active = sim.active_vertices();
+    edges.retain(|edge| edge.iter().all(|v| active[*v as usize]));
     for (i, body) in (0_u32..).zip(&scene.bodies) {
         let (positions, faces) = sim.body_mesh(i)?;
         summary.body_crossings += crossings::crossing_edges(x, &edges, &positions, &faces).len();
         parts.push(Part::body(&body.name, positions, faces));
     }
-    let sewn = SewnSurface::new(sim.mesh(), x).crossings(usize::MAX)?;
+    let mut sewn = SewnSurface::new(sim.mesh(), x).crossings(usize::MAX)?;
+    sewn.retain(|(edge, _)| edge.iter().all(|v| active[*v as usize]));
     summary.self_crossings = sewn.len();
     let mut motions = frames.motions();
     if let Some(mesh) = sim.yarns() {
