@@ -341,3 +341,37 @@ fn pins_flatten_what_has_curled_in_one_drape() {
     // twice the length of a segment, at most
     assert!(tension < 2.0 * 17.7, "{tension}");
 }
+
+/// What hangs by a node of one yarn pulls the next contact towards it, which passes such a node elsewhere: at a pin
+/// it stops where the yarns' thickness has no more room.
+#[test]
+fn contacts_stop_at_pinned_nodes() {
+    let yarns = r#"{"chart": [".-o/", ".\\o.", "\\o--", "--.-"], "loop_width": 0.00108, "radius": 0.000153,
+        "young": 4.1e6, "bending": 0.004, "friction": 0}"#;
+    let (width, height) = (0.00476, 0.00433);
+    let mut sim = sim(
+        &patch(yarns, width, height, WHOLE),
+        -9.81,
+        &[("solver.newton.relative_tolerance", 1e-2)],
+    );
+    let corners = [0.0, width].map(|x| sim.locate_yarn_node(0, [x, height]).unwrap());
+    sim.pin_yarn_nodes(&corners, None).unwrap();
+    let mut least = 1.0_f64;
+    for step in 0..100 {
+        if let Err(e) = sim.step(1e-3) {
+            panic!("step {step}: {}", e.message);
+        }
+        let (mesh, u) = (sim.yarns().unwrap(), sim.yarn_coordinates());
+        for y in 0..mesh.yarn_count() {
+            for i in mesh.starts[y] as usize + 1..mesh.starts[y + 1] as usize {
+                let [a, b] = [i - 1, i].map(|i| mesh.incidences[i]);
+                if corners.contains(&a.node) || corners.contains(&b.node) {
+                    least = least.min((u[i] - u[i - 1]) / (b.u - a.u));
+                }
+            }
+        }
+    }
+    println!("least {least:.3} of the laid length");
+    // the contact has come to the pin and is fixed by the end of the step in which less than a fifth is left
+    assert!(least > 0.18 && least < 0.4, "{least}");
+}

@@ -3,10 +3,11 @@
 //!
 //! Acts on material coordinates alone; `L` is the length at rest. Fibres pack before they resist (van Wyk 1946): the
 //! stiffness grows from zero over a quarter of `d` to `k_c L`, `R''(t) = t/w` up to `w = d/4` and 1 beyond, so that
-//! there is no kink where contact begins. Where contacts may come off, which they do in time alone, `d` is smaller in
-//! time than in relaxations. Damping acts on `min(du - d, 0)`. `Psd` and `Exact` agree, but for the kink of
-//! the damping at `du = d`. SI units; `k_c` in N/m^2.
+//! there is no kink where contact begins. Where contacts may come off, which they do in time alone and not at
+//! pins, `d` is smaller in time than in relaxations. Damping acts on `min(du - d, 0)`. `Psd` and `Exact` agree, but
+//! for the kink of the damping at `du = d`. SI units; `k_c` in N/m^2.
 
+use super::super::state::State;
 use super::angle::Jam;
 use super::kernel::{Kernel, Local, Lower};
 
@@ -23,11 +24,15 @@ pub struct Spacing {
     pub damping: f64,
     /// Least length in steps in time [m], smaller where one contact may pass the other.
     pub least_in_time: f64,
+    /// Nodes at both ends.
+    pub nodes: [u32; 2],
+    /// Whether one of them is pinned: nothing passes there.
+    pub held: bool,
 }
 
 impl Spacing {
     fn least(&self, at: &Local<'_, 2>) -> f64 {
-        if at.inv_dt > 0.0 {
+        if at.inv_dt > 0.0 && !self.held {
             self.least_in_time
         } else {
             self.least
@@ -56,6 +61,7 @@ impl Spacing {
 impl Kernel<2> for Spacing {
     const NAME: &'static str = "yarn_spacing";
     const POSITIONS: usize = 0;
+    const LAGGED: bool = true;
 
     fn value(&self, at: &Local<'_, 2>) -> f64 {
         let (now, since) = self.gap(at);
@@ -80,6 +86,20 @@ impl Kernel<2> for Spacing {
             out[0][0] = k;
             out[1][0] = -k;
             out[1][1] = k;
+        }
+    }
+
+    fn begin(&mut self, _: &Local<'_, 2>, _: &[f64; 2], state: &State) {
+        if self.least_in_time < self.least {
+            let first = (state.positions.len() - state.yarn_normals.len()) as u32;
+            let pinned = |node: u32| {
+                let point = first + node;
+                state
+                    .pins
+                    .binary_search_by_key(&point, |p| p.vertex)
+                    .is_ok()
+            };
+            self.held = self.nodes.into_iter().any(pinned);
         }
     }
 }

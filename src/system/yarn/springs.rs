@@ -203,6 +203,8 @@ pub(super) fn spacings(
             least: spacing.least,
             damping: m.damping_stiffness,
             least_in_time: spacing.least,
+            nodes: spacing.incidences.map(|i| mesh.incidences[i as usize].node),
+            held: false,
         };
         out.push(stencil(&[], &spacing.incidences, kernel));
     }
@@ -221,6 +223,8 @@ pub(super) fn spacings(
                         Passing::Kept => CLOSEST * laid,
                         _ => (LEFT * m.radius).min(CLOSEST * laid),
                     },
+                    nodes,
+                    held: false,
                 };
                 out.push(stencil(&[], &[i as u32 - 1, i as u32], kernel));
             }
