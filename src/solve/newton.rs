@@ -475,11 +475,12 @@ impl Problem<'_> {
                 summary.converged = true;
                 return Ok(summary);
             }
-            if tolerance.motion > 0.0 && length == 1.0 {
-                if moved <= tolerance.motion * self.weighed(self.x0, x) {
-                    summary.converged = true;
-                    return Ok(summary);
-                }
+            if tolerance.motion > 0.0
+                && length == 1.0
+                && moved <= tolerance.motion * self.weighed(self.x0, x)
+            {
+                summary.converged = true;
+                return Ok(summary);
             }
             if length * reach <= tolerance.displacement {
                 // where friction sticks in the model but slips in truth the correction is small and
