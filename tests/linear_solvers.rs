@@ -334,6 +334,11 @@ fn the_choice_follows_its_number() {
         let mut automatic = solver(0, n, Made::Yarns, &Workers::default());
         automatic.prepare(&case.matrix).expect("prepares");
         assert_eq!(automatic.name(), expected, "{n} blocks of yarns, step {h}");
+        let mut matrix = case.matrix;
+        let diagonal = matrix.pattern.starts[n / 2] as usize;
+        matrix.blocks[diagonal] = -matrix.blocks[diagonal];
+        let refused = automatic.prepare(&matrix);
+        assert_eq!(refused, Err(LinearError::NotPositiveDefinite));
     }
     for (n, h, expected) in [
         (1_600, 1e-2, "cg_ic0"),

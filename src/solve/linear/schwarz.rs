@@ -165,7 +165,6 @@ impl Part {
             self.double = None;
             return Ok(());
         }
-        self.single = None;
         Cholesky::for_pattern(&mut self.double, &self.pattern)?.prepare_blocks(block)
     }
 

@@ -11,6 +11,7 @@ use crate::math::block::{BlockMatrix, BlockPattern};
 
 /// Part of the diagonal blocks below which a coupling is left out.
 const DROPPED: f64 = 3e-3;
+
 /// Which blocks of a matrix are kept, and what is added to its diagonals for the others.
 #[derive(Default)]
 pub(super) struct StiffPart {
