@@ -8,7 +8,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use toile::math::{Vec2, Vec3};
 use toile::system::term::{Configuration, Term};
 use toile::system::yarn::inertia::{Mass, inertia_force};
-use toile::system::yarn::kernel::{Kernel, Local};
+use toile::system::yarn::kernel::{Damped, Kernel, Local};
 use toile::system::yarn::shear::{Shear, lock};
 use toile::yarn::Family;
 
@@ -226,6 +226,7 @@ fn shear_locks_where_yarns_touch() {
         let local = Local {
             q: &q,
             q0: &q,
+            start: Damped::default(),
             inv_dt: 0.0,
             gravity: Vec3::zeros(),
         };

@@ -6,7 +6,9 @@
 //! * vertices stay where they are: those that followed yarns and have triangles again are the least-squares match that they were;
 //! * nodes, passages and strands that are there before and after keep positions, velocities, coordinates, friction and normals bit by
 //!   bit, but for nodes that ride on triangles now or are blended with them, which go where those say;
-//! * what comes in lies in the triangles as they are, `x = B v + lift n`, with the velocity of that, its coordinates as laid, without friction.
+//! * what comes in lies in the triangles as they are, `x = B v + lift n`, with the velocity of that, without friction;
+//! * yarn that comes in or whose nodes were moved goes on from what the yarn has beside it with the same stretch: else slip would become
+//!   strain there, again in every change.
 //!
 //! Velocities are those of the cloth, so the momentum changes as the mass does where yarns do not weigh what triangles do. Yarns that
 //! came out of contacts must stay whole: triangles cannot tell what has come apart.
@@ -27,6 +29,8 @@ use crate::yarn::{Names, Topology, YarnMesh};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+/// Distance of two nodes, over the yarn between them, below which they are at one point.
+const POINT: f64 = 1e-3;
 /// Most that a segment that comes in may be longer or shorter than laid, over that.
 const MOST_SLIP: f64 = 0.8;
 
@@ -41,6 +45,12 @@ pub struct RegionChange {
     pub laid: usize,
     /// Nodes that went.
     pub gone: usize,
+}
+
+/// What coordinates come from.
+struct Was<'a> {
+    u: &'a [f64],
+    nodes: &'a [Vec3],
 }
 
 /// For what there is now its number before.
@@ -179,7 +189,11 @@ impl Sim {
             part.coupling.riders.carry(values);
         }
         let list = &before.passages;
-        state.u = picked(list, &old.u, |i| mesh.incidences[i].u);
+        let was = Was {
+            u: &old.u,
+            nodes: &old.positions[count..],
+        };
+        state.u = slid_along(before, mesh, &was, &state.positions[count..]);
         state.u_rates = picked(list, &old.u_rates, |_| 0.0);
         state.sliding = picked(list, &old.sliding, |_| false);
         for (i, incidence) in mesh.incidences.iter().enumerate() {
@@ -214,13 +228,21 @@ impl Sim {
                 let Some(i) = before.passages[strand.incidence as usize] else {
                     continue;
                 };
-                let was = self.state.strands[place[i as usize]];
+                // what was put elsewhere along the yarn takes its anchors with it
+                let shift =
+                    |now: u32, before: u32| state.u[now as usize] - self.state.u[before as usize];
+                let own = shift(strand.incidence, i);
+                let mut was = self.state.strands[place[i as usize]];
+                was.anchor += own;
                 let now = &mut state.strands[new.stack_starts[n] as usize + k];
-                let beside = (stack.get(k + 1)).map(|s| before.passages[s.incidence as usize]);
-                if beside == next[i as usize].map(Some) {
-                    *now = was;
-                } else {
-                    now.anchor = was.anchor;
+                let beside = stack.get(k + 1).map(|s| s.incidence);
+                match (beside, next[i as usize]) {
+                    (None, None) => *now = was,
+                    (Some(b), Some(j)) if before.passages[b as usize] == Some(j) => {
+                        was.beside += own - shift(b, j);
+                        *now = was;
+                    }
+                    _ => now.anchor = was.anchor,
                 }
             }
         }
@@ -337,6 +359,57 @@ impl Before {
         before.passages = new.now.passages.iter().map(was).collect();
         before
     }
+}
+
+/// Material coordinates. A passage that was there and whose node stays keeps its own. The others follow along the yarn from the nearest
+/// of those, segment by segment: where both ends were there a segment keeps its stretch `|x1 - x0|/(u1 - u0)`, else it is as long
+/// as laid; between two that keep theirs all lengths are scaled to fit.
+fn slid_along(before: &Before, mesh: &YarnMesh, was: &Was<'_>, nodes: &[Vec3]) -> Vec<f64> {
+    let node = |i: usize| mesh.incidences[i].node as usize;
+    let there = |i: usize| Some((before.passages[i]?, before.nodes[node(i)]?));
+    let stays = |i: usize| there(i).is_some_and(|(_, n)| was.nodes[n as usize] == nodes[node(i)]);
+    let length = |i: usize| {
+        let laid = mesh.incidences[i + 1].u - mesh.incidences[i].u;
+        let (Some((p, a)), Some((q, b))) = (there(i), there(i + 1)) else {
+            return laid;
+        };
+        let [a, b] = [a, b].map(|n| was.nodes[n as usize]);
+        let (apart, length) = ((b - a).norm(), was.u[q as usize] - was.u[p as usize]);
+        let now = (nodes[node(i + 1)] - nodes[node(i)]).norm();
+        let grown = if apart > POINT * length {
+            now / apart
+        } else {
+            1.0
+        };
+        length * grown.clamp(1.0 - MOST_SLIP, 1.0 / (1.0 - MOST_SLIP))
+    };
+    let known = |i: usize| before.passages[i].map_or(mesh.incidences[i].u, |p| was.u[p as usize]);
+    let mut u: Vec<f64> = (0..mesh.incidences.len()).map(known).collect();
+    for ends in mesh.starts.windows(2) {
+        let range = ends[0] as usize..ends[1] as usize;
+        let mut held: Vec<usize> = range.clone().filter(|i| stays(*i)).collect();
+        if held.is_empty() {
+            held.extend(range.clone().find(|i| there(*i).is_some()));
+        }
+        let (Some(&first), Some(&last)) = (held.first(), held.last()) else {
+            continue;
+        };
+        for i in (range.start..first).rev() {
+            u[i] = u[i + 1] - length(i);
+        }
+        for pair in held.windows(2) {
+            let between = pair[0]..pair[1];
+            let whole: f64 = between.clone().map(length).sum();
+            let scale = (u[pair[1]] - u[pair[0]]) / whole;
+            for i in between.take(pair[1] - pair[0] - 1) {
+                u[i + 1] = u[i] + scale * length(i);
+            }
+        }
+        for i in last + 1..range.end {
+            u[i] = u[i - 1] + length(i - 1);
+        }
+    }
+    u
 }
 
 fn numbers(names: &[Name]) -> BTreeMap<Name, u32> {

@@ -9,7 +9,7 @@
 
 use super::super::state::State;
 use super::super::term::{Configuration, HessianKind, Stencils, Term};
-use super::kernel::{Kernel, Local, MAX_POSITIONS, MAX_SLIDES};
+use super::kernel::{Damped, Kernel, Local, Lower, MAX_POSITIONS, MAX_SLIDES};
 use super::unknowns::Unknowns;
 use crate::math::{Mat3, Vec3};
 use crate::yarn::YarnMesh;
@@ -30,6 +30,8 @@ pub(super) struct Stencil<K> {
 
 struct Element<K, const N: usize> {
     kernel: K,
+    /// Damping in this step.
+    start: Damped,
     /// Part of the energy that is the yarns'.
     weight: f64,
     incidences: [u32; MAX_SLIDES],
@@ -98,6 +100,7 @@ pub(super) fn terms<K: Kernel<N> + 'static, const N: usize>(
         group.blocks.extend_from_slice(&blocks[..arity]);
         group.elements.push(Element {
             kernel: stencil.kernel,
+            start: Damped::default(),
             weight,
             incidences: stencil.incidences,
             place,
@@ -143,36 +146,24 @@ impl<K: Kernel<N>, const N: usize> YarnTerm<K, N> {
         at: &Configuration<'_>,
         f: impl FnOnce(&K, &Local<'_, N>) -> R,
     ) -> R {
-        let (q, q0) = (self.gather(e, at.x, at.u), self.gather(e, at.x0, at.u));
+        let q = self.gather(e, at.x, at.u);
+        let q0 = if K::LOOKS_BACK {
+            self.gather(e, at.x0, at.u)
+        } else {
+            [0.0; N]
+        };
+        let Element { kernel, start, .. } = &self.elements[e];
         let local = Local {
             q: &q,
             q0: &q0,
+            start: *start,
             inv_dt: at.inv_dt,
             gravity: at.world.gravity,
         };
-        f(&self.elements[e].kernel, &local)
-    }
-}
-
-impl<K: Kernel<N>, const N: usize> Term for YarnTerm<K, N> {
-    fn name(&self) -> &'static str {
-        K::NAME
+        f(kernel, &local)
     }
 
-    fn stencils(&self) -> Stencils<'_> {
-        Stencils {
-            arity: self.arity,
-            vertices: &self.blocks,
-        }
-    }
-
-    fn value(&self, e: usize, at: &Configuration<'_>) -> f64 {
-        self.with(e, at, |kernel, local| kernel.value(local)) * self.elements[e].weight
-    }
-
-    fn gradient(&self, e: usize, at: &Configuration<'_>, out: &mut [Vec3]) {
-        let mut g = [0.0; N];
-        self.with(e, at, |kernel, local| kernel.gradient(local, &mut g));
+    fn spread_gradient(&self, e: usize, g: &[f64; N], out: &mut [Vec3]) {
         out.fill(Vec3::zeros());
         let Element { weight, place, .. } = &self.elements[e];
         for (place, g) in place.iter().zip(g) {
@@ -182,17 +173,8 @@ impl<K: Kernel<N>, const N: usize> Term for YarnTerm<K, N> {
         }
     }
 
-    fn hessian(&self, e: usize, at: &Configuration<'_>, kind: HessianKind, out: &mut [Mat3]) {
-        let mut h = [[0.0; N]; N];
-        self.with(e, at, |kernel, local| {
-            kernel.hessian(local, kind.exactness(), &mut h);
-        });
+    fn spread_hessian(&self, e: usize, h: &Lower<N>, out: &mut [Mat3]) {
         let Element { weight, place, .. } = &self.elements[e];
-        for row in &mut h {
-            for entry in row {
-                *entry *= weight;
-            }
-        }
         out.fill(Mat3::zeros());
         for p in 0..K::POSITIONS {
             for r in 0..=p {
@@ -200,11 +182,12 @@ impl<K: Kernel<N>, const N: usize> Term for YarnTerm<K, N> {
                 let mut m = Mat3::zeros();
                 for a in 0..3 {
                     for b in 0..3 {
-                        m[(a, b)] = if p == r && b > a {
-                            h[3 * p + b][3 * p + a]
-                        } else {
-                            h[3 * p + a][3 * r + b]
-                        };
+                        m[(a, b)] = weight
+                            * if p == r && b > a {
+                                h[3 * p + b][3 * p + a]
+                            } else {
+                                h[3 * p + a][3 * r + b]
+                            };
                     }
                 }
                 let slot = &mut out[i.max(j) * (i.max(j) + 1) / 2 + i.min(j)];
@@ -229,17 +212,65 @@ impl<K: Kernel<N>, const N: usize> Term for YarnTerm<K, N> {
                 }
                 let (j, b) = (usize::from(place[l] / 3), usize::from(place[l] % 3));
                 let slot = &mut out[i.max(j) * (i.max(j) + 1) / 2 + i.min(j)];
+                let second = weight * h[k][l];
                 if i >= j {
-                    slot[(a, b)] += h[k][l];
+                    slot[(a, b)] += second;
                 } else {
-                    slot[(b, a)] += h[k][l];
+                    slot[(b, a)] += second;
                 }
                 // a coordinate that is in the stencil twice, itself and its image, has both halves
                 if i == j && (a != b || k != l) {
-                    slot[(b, a)] += h[k][l];
+                    slot[(b, a)] += second;
                 }
             }
         }
+    }
+}
+
+impl<K: Kernel<N>, const N: usize> Term for YarnTerm<K, N> {
+    fn name(&self) -> &'static str {
+        K::NAME
+    }
+
+    fn stencils(&self) -> Stencils<'_> {
+        Stencils {
+            arity: self.arity,
+            vertices: &self.blocks,
+        }
+    }
+
+    fn value(&self, e: usize, at: &Configuration<'_>) -> f64 {
+        self.with(e, at, |kernel, local| kernel.value(local)) * self.elements[e].weight
+    }
+
+    fn gradient(&self, e: usize, at: &Configuration<'_>, out: &mut [Vec3]) {
+        let mut g = [0.0; N];
+        self.with(e, at, |kernel, local| kernel.gradient(local, &mut g));
+        self.spread_gradient(e, &g, out);
+    }
+
+    fn hessian(&self, e: usize, at: &Configuration<'_>, kind: HessianKind, out: &mut [Mat3]) {
+        let (mut g, mut h) = ([0.0; N], [[0.0; N]; N]);
+        self.with(e, at, |kernel, local| {
+            kernel.derivatives(local, kind.exactness(), &mut g, &mut h);
+        });
+        self.spread_hessian(e, &h, out);
+    }
+
+    fn derivatives(
+        &self,
+        e: usize,
+        at: &Configuration<'_>,
+        kind: HessianKind,
+        gradient: &mut [Vec3],
+        hessian: &mut [Mat3],
+    ) {
+        let (mut g, mut h) = ([0.0; N], [[0.0; N]; N]);
+        self.with(e, at, |kernel, local| {
+            kernel.derivatives(local, kind.exactness(), &mut g, &mut h);
+        });
+        self.spread_gradient(e, &g, gradient);
+        self.spread_hessian(e, &h, hessian);
     }
 
     fn is_idle(&self, at: &Configuration<'_>) -> bool {
@@ -255,6 +286,16 @@ impl<K: Kernel<N>, const N: usize> Term for YarnTerm<K, N> {
     }
 
     fn begin_step(&mut self, state: &State, at: &Configuration<'_>) -> bool {
+        if K::DAMPED {
+            for e in 0..self.elements.len() {
+                self.elements[e].start = if at.inv_dt > 0.0 {
+                    let q0 = self.gather(e, at.x0, at.u);
+                    self.elements[e].kernel.start(&q0, at.inv_dt)
+                } else {
+                    Damped::default()
+                };
+            }
+        }
         if !K::LAGGED {
             return false;
         }
@@ -263,6 +304,7 @@ impl<K: Kernel<N>, const N: usize> Term for YarnTerm<K, N> {
             let local = Local {
                 q: &q0,
                 q0: &q0,
+                start: Damped::default(),
                 inv_dt: at.inv_dt,
                 gravity: at.world.gravity,
             };

@@ -17,7 +17,7 @@
 //! that long. SI units.
 
 use super::angle::{Angle, Jam, Moment, angle};
-use super::kernel::{Kernel, Local, Lower, add_square, point, set_point};
+use super::kernel::{Damped, Kernel, Local, Lower, add_square, point, set_point};
 use crate::math::Vec3;
 
 /// Jamming of a yarn bent past a right angle.
@@ -66,22 +66,30 @@ fn frame(q: &[f64; 11]) -> (Angle, f64) {
     (Angle::new(&a, &b, FLOOR * du.abs()), du)
 }
 
+/// Derivative of the angle by the scalars.
+fn by_nodes(bend: &Angle) -> [f64; 11] {
+    let [a, b] = bend.gradient();
+    let mut out = [0.0; 11];
+    set_point(&mut out, 0, &-a);
+    set_point(&mut out, 1, &(a - b));
+    set_point(&mut out, 2, &b);
+    out
+}
+
 impl Bending {
-    /// Weight of the damping and `r` at the start of the step.
-    fn damped(&self, at: &Local<'_, 11>) -> (f64, f64) {
-        let rate = self.damping * at.inv_dt;
-        if rate > 0.0 {
-            let [a, b] = edges(at.q0);
-            let weight = 2.0 * rate * self.stiffness / (at.q0[10] - at.q0[9]);
-            (weight, softened(angle(&a, &b)))
-        } else {
-            (0.0, 0.0)
-        }
+    /// Derivative of the energy by the scalars, with `j` that of the angle.
+    fn force(&self, j: &[f64; 11], moment: f64, g: f64, du: f64, out: &mut [f64; 11]) {
+        *out = j.map(|j| j * moment);
+        out[9] = self.stiffness * g / (du * du);
+        out[10] = -out[9];
     }
 
     fn moment(&self, at: &Local<'_, 11>, bend: &Angle, du: f64, g: &[f64; 3]) -> Moment {
         let k = self.stiffness / du;
-        let (c, start) = self.damped(at);
+        let Damped {
+            weight: c,
+            measure: start,
+        } = at.start;
         let theta = bend.theta;
         let mut by_theta = if g[1] > 0.0 {
             k * g[1] / theta
@@ -113,17 +121,13 @@ impl Bending {
 impl Kernel<11> for Bending {
     const NAME: &'static str = "yarn_bending";
     const POSITIONS: usize = 3;
+    const DAMPED: bool = true;
 
     fn value(&self, at: &Local<'_, 11>) -> f64 {
         let [a, b] = edges(at.q);
         let theta = angle(&a, &b);
-        let (c, start) = self.damped(at);
-        let since = softened(theta) - start;
-        let damped = if c > 0.0 {
-            0.5 * c * since * since
-        } else {
-            0.0
-        };
+        let since = softened(theta) - at.start.measure;
+        let damped = 0.5 * at.start.weight * since * since;
         self.stiffness * law(theta)[0] / (at.q[10] - at.q[9]) + damped
     }
 
@@ -131,24 +135,21 @@ impl Kernel<11> for Bending {
         let (bend, du) = frame(at.q);
         let g = law(bend.theta);
         let moment = self.moment(at, &bend, du, &g);
-        let [a, b] = bend.gradient();
-        let (a, b) = (a * moment.value, b * moment.value);
-        set_point(out, 0, &-a);
-        set_point(out, 1, &(a - b));
-        set_point(out, 2, &b);
-        out[9] = self.stiffness * g[0] / (du * du);
-        out[10] = -out[9];
+        self.force(&by_nodes(&bend), moment.value, g[0], du, out);
     }
 
-    fn hessian(&self, at: &Local<'_, 11>, exactness: f64, out: &mut Lower<11>) {
+    fn derivatives(
+        &self,
+        at: &Local<'_, 11>,
+        exactness: f64,
+        gradient: &mut [f64; 11],
+        out: &mut Lower<11>,
+    ) {
         let (bend, du) = frame(at.q);
         let g = law(bend.theta);
         let moment = self.moment(at, &bend, du, &g);
-        let [a, b] = bend.gradient();
-        let mut j = [0.0; 11];
-        set_point(&mut j, 0, &-a);
-        set_point(&mut j, 1, &(a - b));
-        set_point(&mut j, 2, &b);
+        let j = by_nodes(&bend);
+        self.force(&j, moment.value, g[0], du, gradient);
         add_square(out, moment.square(exactness), &j);
         bend.add_curvature(&WEIGHTS, &moment, exactness, out);
         // by du, and mixed
@@ -162,5 +163,13 @@ impl Kernel<11> for Bending {
         out[9][9] += second;
         out[10][9] -= second;
         out[10][10] += second;
+    }
+
+    fn start(&self, q0: &[f64; 11], inv_dt: f64) -> Damped {
+        let [a, b] = edges(q0);
+        Damped {
+            weight: 2.0 * self.damping * inv_dt * self.stiffness / (q0[10] - q0[9]),
+            measure: softened(angle(&a, &b)),
+        }
     }
 }

@@ -16,7 +16,7 @@
 
 use super::super::state::StrandState;
 use super::bending::Bending;
-use super::kernel::{Kernel, Local};
+use super::kernel::{Damped, Kernel, Local};
 use super::normals::{Plane, Turn};
 use super::spacing::Spacing;
 use super::stack::{MAX_STACK, StackRule, held_normal_forces, normal_forces};
@@ -375,6 +375,7 @@ fn still<const N: usize>(q: &[f64; N]) -> Local<'_, N> {
     Local {
         q,
         q0: q,
+        start: Damped::default(),
         inv_dt: 0.0,
         gravity: Vec3::zeros(),
     }

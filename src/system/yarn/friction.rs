@@ -113,6 +113,7 @@ impl Rubbing {
 impl Kernel<1> for Rubbing {
     const NAME: &'static str = "sliding_friction";
     const POSITIONS: usize = 0;
+    const LOOKS_BACK: bool = true;
     const LAGGED: bool = true;
 
     fn value(&self, at: &Local<'_, 1>) -> f64 {
@@ -125,7 +126,14 @@ impl Kernel<1> for Rubbing {
         out[0] = self.force(at.q[0]) + self.viscosity * at.inv_dt * moved;
     }
 
-    fn hessian(&self, at: &Local<'_, 1>, exactness: f64, out: &mut Lower<1>) {
+    fn derivatives(
+        &self,
+        at: &Local<'_, 1>,
+        exactness: f64,
+        gradient: &mut [f64; 1],
+        out: &mut Lower<1>,
+    ) {
+        Kernel::<1>::gradient(self, at, gradient);
         out[0][0] = self.curvature(at.q[0], exactness) + self.viscosity * at.inv_dt;
     }
 
@@ -155,7 +163,14 @@ impl Kernel<2> for Rubbing {
         *out = [force, -force];
     }
 
-    fn hessian(&self, at: &Local<'_, 2>, exactness: f64, out: &mut Lower<2>) {
+    fn derivatives(
+        &self,
+        at: &Local<'_, 2>,
+        exactness: f64,
+        gradient: &mut [f64; 2],
+        out: &mut Lower<2>,
+    ) {
+        Kernel::<2>::gradient(self, at, gradient);
         let k = self.curvature(at.q[0] - at.q[1], exactness);
         out[0][0] = k;
         out[1][0] = -k;

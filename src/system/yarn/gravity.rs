@@ -36,7 +36,14 @@ impl Kernel<8> for Weight {
         out[7] = -out[6];
     }
 
-    fn hessian(&self, at: &Local<'_, 8>, exactness: f64, out: &mut Lower<8>) {
+    fn derivatives(
+        &self,
+        at: &Local<'_, 8>,
+        exactness: f64,
+        gradient: &mut [f64; 8],
+        out: &mut Lower<8>,
+    ) {
+        self.gradient(at, gradient);
         let half = at.gravity * (0.5 * self.density * exactness);
         for c in 0..6 {
             out[6][c] = half[c % 3];

@@ -157,6 +157,7 @@ impl Inertia {
 impl Kernel<8> for Inertia {
     const NAME: &'static str = "yarn_inertia";
     const POSITIONS: usize = 2;
+    const LOOKS_BACK: bool = true;
     const INTERNAL: bool = false;
     const LAGGED: bool = true;
 
@@ -174,7 +175,8 @@ impl Kernel<8> for Inertia {
         *out = minus(&self.mass.times(&y), &self.force);
     }
 
-    fn hessian(&self, at: &Local<'_, 8>, _: f64, out: &mut Lower<8>) {
+    fn derivatives(&self, at: &Local<'_, 8>, _: f64, gradient: &mut [f64; 8], out: &mut Lower<8>) {
+        self.gradient(at, gradient);
         let scale = self.factors(at).iter().sum::<f64>() * self.mass.sixth;
         let w = &self.mass.w;
         let ww = w.norm_squared();

@@ -22,12 +22,23 @@ pub type Lower<const N: usize> = [[f64; N]; N];
 pub struct Local<'a, const N: usize> {
     /// Scalars now.
     pub q: &'a [f64; N],
-    /// Scalars at the start of the step.
+    /// Scalars at the start of the step; zeros for a kernel that does not look back.
     pub q0: &'a [f64; N],
+    /// Weight of the damping and the measure at the start of the step, [`Kernel::start`] of a kernel that is damped by it.
+    pub start: Damped,
     /// One over the step size [1/s], 0 in statics.
     pub inv_dt: f64,
     /// Acceleration of gravity [m/s^2].
     pub gravity: Vec3,
+}
+
+/// Damping by a measure `m` of strain: `weight/2 (m - measure)^2`.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Damped {
+    /// Weight [J] over the unit of the measure squared.
+    pub weight: f64,
+    /// The measure at the start of the step.
+    pub measure: f64,
 }
 
 /// Node `k` of a list of scalars.
@@ -50,13 +61,29 @@ pub trait Kernel<const N: usize>: Send + Sync {
     const BOUNDS: bool = false;
     /// Whether it takes something from the State or leaves something there.
     const LAGGED: bool = false;
+    /// Whether the scalars of the start of the step count in a step.
+    const LOOKS_BACK: bool = false;
+    /// Whether it is damped by what [`Self::start`] tells.
+    const DAMPED: bool = false;
 
     /// Energy [J]; infinite where the stencil cannot be.
     fn value(&self, at: &Local<'_, N>) -> f64;
     /// Its derivative, overwriting `out`.
     fn gradient(&self, at: &Local<'_, N>, out: &mut [f64; N]);
-    /// Its second derivative, added to the zeros in `out`: `H_psd + exactness (H_exact - H_psd)`.
-    fn hessian(&self, at: &Local<'_, N>, exactness: f64, out: &mut Lower<N>);
+    /// Its derivative, overwriting `gradient`, and its second derivative, added to the zeros in `hessian`:
+    /// `H_psd + exactness (H_exact - H_psd)`.
+    fn derivatives(
+        &self,
+        at: &Local<'_, N>,
+        exactness: f64,
+        gradient: &mut [f64; N],
+        hessian: &mut Lower<N>,
+    );
+    /// Its damping in a step that begins at the scalars `q0`.
+    fn start(&self, q0: &[f64; N], inv_dt: f64) -> Damped {
+        let _ = (q0, inv_dt);
+        Damped::default()
+    }
     /// Whether there is no energy at this step size, wherever the nodes are.
     fn is_idle(inv_dt: f64) -> bool {
         let _ = inv_dt;

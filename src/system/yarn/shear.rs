@@ -13,7 +13,7 @@
 //! tip, far inside the jam. SI units.
 
 use super::angle::{Angle, Jam, Moment, angle};
-use super::kernel::{Kernel, Local, Lower, add_square, point, set_point};
+use super::kernel::{Damped, Kernel, Local, Lower, add_square, point, set_point};
 use crate::math::Vec3;
 use std::f64::consts::FRAC_PI_2;
 
@@ -42,6 +42,16 @@ fn edges(q: &[f64; 9]) -> [Vec3; 2] {
     [point(q, 1) - middle, point(q, 2) - middle]
 }
 
+/// Derivative of the angle by the scalars.
+fn by_nodes(corner: &Angle) -> [f64; 9] {
+    let [a, b] = corner.gradient();
+    let mut out = [0.0; 9];
+    set_point(&mut out, 0, &-(a + b));
+    set_point(&mut out, 1, &a);
+    set_point(&mut out, 2, &b);
+    out
+}
+
 impl Shear {
     /// Corner of the stiffness `k_x` [N] at the pitch `length` between yarns of radius `radius` [m].
     pub fn new(stiffness: f64, radius: f64, length: f64, damping: f64) -> Self {
@@ -57,21 +67,15 @@ impl Shear {
         }
     }
 
-    /// Weight of the damping and change of the angle.
-    fn damped(&self, at: &Local<'_, 9>, phi: f64) -> (f64, f64) {
-        let rate = self.damping * at.inv_dt;
-        if rate > 0.0 {
-            let [a, b] = edges(at.q0);
-            (rate * self.stiffness, phi - angle(&a, &b))
-        } else {
-            (0.0, 0.0)
-        }
+    fn corner(&self, q: &[f64; 9]) -> Angle {
+        let [a, b] = edges(q);
+        Angle::new(&a, &b, FLOOR * self.length)
     }
 
     fn moment(&self, at: &Local<'_, 9>, corner: &Angle) -> Moment {
         let g = corner.theta - FRAC_PI_2;
         let jam = self.jam.at(g.abs());
-        let (c, since) = self.damped(at, corner.theta);
+        let (c, since) = (at.start.weight, corner.theta - at.start.measure);
         let value = self.stiffness * (g + jam[1] * g.signum()) + c * since;
         let slope = self.stiffness * (1.0 + jam[2]) + c;
         Moment {
@@ -85,35 +89,42 @@ impl Shear {
 impl Kernel<9> for Shear {
     const NAME: &'static str = "yarn_shear";
     const POSITIONS: usize = 3;
+    const DAMPED: bool = true;
 
     fn value(&self, at: &Local<'_, 9>) -> f64 {
         let [a, b] = edges(at.q);
         let phi = angle(&a, &b);
         let g = phi - FRAC_PI_2;
-        let (c, since) = self.damped(at, phi);
+        let (c, since) = (at.start.weight, phi - at.start.measure);
         self.stiffness * (0.5 * g * g + self.jam.at(g.abs())[0]) + 0.5 * c * since * since
     }
 
     fn gradient(&self, at: &Local<'_, 9>, out: &mut [f64; 9]) {
-        let [a, b] = edges(at.q);
-        let corner = Angle::new(&a, &b, FLOOR * self.length);
+        let corner = self.corner(at.q);
         let moment = self.moment(at, &corner).value;
-        let [a, b] = corner.gradient().map(|g| g * moment);
-        set_point(out, 0, &-(a + b));
-        set_point(out, 1, &a);
-        set_point(out, 2, &b);
+        *out = by_nodes(&corner).map(|j| j * moment);
     }
 
-    fn hessian(&self, at: &Local<'_, 9>, exactness: f64, out: &mut Lower<9>) {
-        let [a, b] = edges(at.q);
-        let corner = Angle::new(&a, &b, FLOOR * self.length);
+    fn derivatives(
+        &self,
+        at: &Local<'_, 9>,
+        exactness: f64,
+        gradient: &mut [f64; 9],
+        out: &mut Lower<9>,
+    ) {
+        let corner = self.corner(at.q);
         let moment = self.moment(at, &corner);
-        let [a, b] = corner.gradient();
-        let mut j = [0.0; 9];
-        set_point(&mut j, 0, &-(a + b));
-        set_point(&mut j, 1, &a);
-        set_point(&mut j, 2, &b);
+        let j = by_nodes(&corner);
+        *gradient = j.map(|j| j * moment.value);
         add_square(out, moment.square(exactness), &j);
         corner.add_curvature(&WEIGHTS, &moment, exactness, out);
+    }
+
+    fn start(&self, q0: &[f64; 9], inv_dt: f64) -> Damped {
+        let [a, b] = edges(q0);
+        Damped {
+            weight: self.damping * inv_dt * self.stiffness,
+            measure: angle(&a, &b),
+        }
     }
 }

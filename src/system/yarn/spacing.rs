@@ -61,6 +61,7 @@ impl Spacing {
 impl Kernel<2> for Spacing {
     const NAME: &'static str = "yarn_spacing";
     const POSITIONS: usize = 0;
+    const LOOKS_BACK: bool = true;
     const LAGGED: bool = true;
 
     fn value(&self, at: &Local<'_, 2>) -> f64 {
@@ -79,7 +80,8 @@ impl Kernel<2> for Spacing {
         *out = [-force, force];
     }
 
-    fn hessian(&self, at: &Local<'_, 2>, _: f64, out: &mut Lower<2>) {
+    fn derivatives(&self, at: &Local<'_, 2>, _: f64, gradient: &mut [f64; 2], out: &mut Lower<2>) {
+        self.gradient(at, gradient);
         let now = self.gap(at).0;
         if now < 0.0 {
             let k = self.stiffness * (self.packing(at, now)[2] + self.damping * at.inv_dt);

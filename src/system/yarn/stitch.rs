@@ -19,6 +19,7 @@ pub struct StitchLength {
 impl Kernel<2> for StitchLength {
     const NAME: &'static str = "stitch_length";
     const POSITIONS: usize = 0;
+    const LOOKS_BACK: bool = true;
 
     fn value(&self, at: &Local<'_, 2>) -> f64 {
         let l = at.q[1] - at.q[0];
@@ -36,7 +37,8 @@ impl Kernel<2> for StitchLength {
         *out = [-force, force];
     }
 
-    fn hessian(&self, at: &Local<'_, 2>, _: f64, out: &mut Lower<2>) {
+    fn derivatives(&self, at: &Local<'_, 2>, _: f64, gradient: &mut [f64; 2], out: &mut Lower<2>) {
+        self.gradient(at, gradient);
         let k = self.stiffness / self.length * (1.0 + self.damping * at.inv_dt);
         out[0][0] = k;
         out[1][0] = -k;

@@ -14,7 +14,7 @@
 //! finite, no longer exact. SI units.
 
 use super::kernel::{
-    Kernel, Local, Lower, add_product, add_square, add_weighted, point, set_point,
+    Damped, Kernel, Local, Lower, add_product, add_square, add_weighted, point, set_point,
 };
 use crate::math::{Mat3, Vec3};
 
@@ -53,15 +53,16 @@ fn frame(q: &[f64; 8]) -> Frame {
 }
 
 impl Stretch {
-    /// Weight of the damping and change of the stretch.
-    fn damped(&self, at: &Local<'_, 8>, stretch: f64) -> (f64, f64) {
-        let rate = self.damping * at.inv_dt;
-        if rate > 0.0 {
-            let start = frame(at.q0);
-            (rate * self.stiffness * start.du, stretch - start.stretch)
-        } else {
-            (0.0, 0.0)
-        }
+    /// Derivative of the energy, and what damping has of the tension.
+    fn force(&self, f: &Frame, start: Damped, out: &mut [f64; 8]) -> f64 {
+        let viscous = start.weight * (f.stretch - start.measure) / f.du;
+        let tension = f.t * (self.stiffness * (f.stretch - 1.0) + viscous);
+        set_point(out, 0, &-tension);
+        set_point(out, 1, &tension);
+        let slide = 0.5 * self.stiffness * (1.0 - f.stretch * f.stretch) - viscous * f.stretch;
+        out[6] = -slide;
+        out[7] = slide;
+        viscous
     }
 }
 
@@ -69,37 +70,36 @@ impl Kernel<8> for Stretch {
     const NAME: &'static str = "yarn_stretch";
     const POSITIONS: usize = 2;
     const BOUNDS: bool = true;
+    const LOOKS_BACK: bool = true;
+    const DAMPED: bool = true;
 
     fn value(&self, at: &Local<'_, 8>) -> f64 {
         let f = frame(at.q);
         if f.du <= 0.0 {
             return f64::INFINITY;
         }
-        let (c, since) = self.damped(at, f.stretch);
-        let strain = f.stretch - 1.0;
-        0.5 * (self.stiffness * f.du * strain * strain + c * since * since)
+        let (strain, since) = (f.stretch - 1.0, f.stretch - at.start.measure);
+        0.5 * (self.stiffness * f.du * strain * strain + at.start.weight * since * since)
     }
 
     fn gradient(&self, at: &Local<'_, 8>, out: &mut [f64; 8]) {
-        let f = frame(at.q);
-        let (c, since) = self.damped(at, f.stretch);
-        let viscous = c * since / f.du;
-        let tension = f.t * (self.stiffness * (f.stretch - 1.0) + viscous);
-        set_point(out, 0, &-tension);
-        set_point(out, 1, &tension);
-        let slide = 0.5 * self.stiffness * (1.0 - f.stretch * f.stretch) - viscous * f.stretch;
-        out[6] = -slide;
-        out[7] = slide;
+        self.force(&frame(at.q), at.start, out);
     }
 
-    fn hessian(&self, at: &Local<'_, 8>, exactness: f64, out: &mut Lower<8>) {
+    fn derivatives(
+        &self,
+        at: &Local<'_, 8>,
+        exactness: f64,
+        gradient: &mut [f64; 8],
+        out: &mut Lower<8>,
+    ) {
         let f = frame(at.q);
-        let (c, since) = self.damped(at, f.stretch);
+        let viscous = self.force(&f, at.start, gradient);
         let j = [
             -f.t.x, -f.t.y, -f.t.z, f.t.x, f.t.y, f.t.z, f.stretch, -f.stretch,
         ];
-        add_square(out, self.stiffness / f.du + c / (f.du * f.du), &j);
-        let viscous = c * since / f.du;
+        let square = self.stiffness / f.du + at.start.weight / (f.du * f.du);
+        add_square(out, square, &j);
         let tension = self.stiffness * (f.stretch - 1.0) + viscous;
         let kept = tension.max(0.0) + exactness * tension.min(0.0);
         let across = (Mat3::identity() - f.t * f.t.transpose()) * (kept / f.length);
@@ -109,6 +109,14 @@ impl Kernel<8> for Stretch {
             let k = exactness * viscous / f.du;
             let e = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, -1.0];
             add_product(out, k, &j, &e);
+        }
+    }
+
+    fn start(&self, q0: &[f64; 8], inv_dt: f64) -> Damped {
+        let f = frame(q0);
+        Damped {
+            weight: self.damping * inv_dt * self.stiffness * f.du,
+            measure: f.stretch,
         }
     }
 

@@ -40,7 +40,8 @@ impl Kernel<9> for TieSpring {
         }
     }
 
-    fn hessian(&self, _: &Local<'_, 9>, _: f64, out: &mut Lower<9>) {
+    fn derivatives(&self, at: &Local<'_, 9>, _: f64, gradient: &mut [f64; 9], out: &mut Lower<9>) {
+        self.gradient(at, gradient);
         let k = Mat3::from_diagonal_element(self.stiffness);
         add_weighted(out, &self.weights(), &k);
     }

@@ -16,7 +16,9 @@
 //! it would be a wall where a wing passes the axis. No material coordinate enters.
 //! SI units; `k_w` in N.
 
-use super::kernel::{Kernel, Local, Lower, add_block, add_product, add_square, point, set_point};
+use super::kernel::{
+    Damped, Kernel, Local, Lower, add_block, add_product, add_square, point, set_point,
+};
 use crate::math::geometry::{
     HingeFloor, dihedral, dihedral_gradient, dihedral_hessian, wrap_angle,
 };
@@ -123,6 +125,11 @@ fn guard_gradient(g: &[Guard; 2]) -> [Vec3; 4] {
     [-aa - aw - ba, aa + ba - bw, aw, bw]
 }
 
+/// `k g + l h`.
+fn combined(k: f64, g: &[f64; 12], l: f64, h: &[f64; 12]) -> [f64; 12] {
+    std::array::from_fn(|i| k * g[i] + l * h[i])
+}
+
 fn flat(v: &[Vec3; 4], scale: f64) -> [f64; 12] {
     let mut out = [0.0; 12];
     for (p, v) in v.iter().enumerate() {
@@ -154,11 +161,9 @@ impl Wrapping {
     }
 
     /// Stiffness [N m] and angle [rad] of the elastic energy and of damping.
-    fn parts(&self, at: &Local<'_, 12>, psi: f64) -> [(f64, f64); 2] {
-        let rate = self.damping * at.inv_dt;
-        let damped = if rate > 0.0 {
-            let since = wrap_angle(psi - self.angle(&points(at.q0)));
-            (rate * self.stiffness, since)
+    fn parts(&self, start: Damped, psi: f64) -> [(f64, f64); 2] {
+        let damped = if start.weight > 0.0 {
+            (start.weight, wrap_angle(psi - start.measure))
         } else {
             (0.0, 0.0)
         };
@@ -205,28 +210,34 @@ impl Wrapping {
 impl Kernel<12> for Wrapping {
     const NAME: &'static str = "stitch_wrapping";
     const POSITIONS: usize = 4;
+    const DAMPED: bool = true;
 
     fn value(&self, at: &Local<'_, 12>) -> f64 {
         let x = points(at.q);
-        let (_, energy) = Self::moments(&self.parts(at, self.angle(&x)));
+        let (_, energy) = Self::moments(&self.parts(at.start, self.angle(&x)));
         let [a, b] = guards(&x, self.length_floor());
         energy * a.value * b.value
     }
 
     fn gradient(&self, at: &Local<'_, 12>, out: &mut [f64; 12]) {
         let x = points(at.q);
-        let (moment, energy) = Self::moments(&self.parts(at, self.angle(&x)));
+        let (moment, energy) = Self::moments(&self.parts(at.start, self.angle(&x)));
         let guards = guards(&x, self.length_floor());
-        let moment = moment * guards[0].value * guards[1].value;
-        let (g, w) = (self.angle_gradient(&x), guard_gradient(&guards));
-        for p in 0..4 {
-            set_point(out, p, &(g[p] * moment + w[p] * energy));
-        }
+        let w = guards[0].value * guards[1].value;
+        let g = flat(&self.angle_gradient(&x), 1.0);
+        let dw = flat(&guard_gradient(&guards), 1.0);
+        *out = combined(moment * w, &g, energy, &dw);
     }
 
-    fn hessian(&self, at: &Local<'_, 12>, exactness: f64, out: &mut Lower<12>) {
+    fn derivatives(
+        &self,
+        at: &Local<'_, 12>,
+        exactness: f64,
+        gradient: &mut [f64; 12],
+        out: &mut Lower<12>,
+    ) {
         let x = points(at.q);
-        let parts = self.parts(at, self.angle(&x));
+        let parts = self.parts(at.start, self.angle(&x));
         let (moment, energy) = Self::moments(&parts);
         let guards = guards(&x, self.length_floor());
         let w = guards[0].value * guards[1].value;
@@ -235,6 +246,7 @@ impl Kernel<12> for Wrapping {
             flat(&psi_gradient, 1.0),
             flat(&guard_gradient(&guards), 1.0),
         );
+        *gradient = combined(moment * w, &g, energy, &dw);
         // square of the gradient of angle sqrt(w), which has no root in it
         let root = w.sqrt();
         let over = if root > 1e-12 { 0.5 / root } else { 0.0 };
@@ -262,6 +274,13 @@ impl Kernel<12> for Wrapping {
             }
         }
         add_guard_hessian(&guards, exactness * energy, out);
+    }
+
+    fn start(&self, q0: &[f64; 12], inv_dt: f64) -> Damped {
+        Damped {
+            weight: self.damping * inv_dt * self.stiffness,
+            measure: self.angle(&points(q0)),
+        }
     }
 }
 
