@@ -146,6 +146,24 @@ fn run_writes_a_complete_summary_models_pattern_and_picture() {
     }
 }
 
+/// Cloth pulled to four times its length is simulated, and the report says what that is worth.
+#[test]
+fn what_is_torn_in_truth_is_noted() {
+    let folder = Folder::new("torn");
+    let mut torn = scene();
+    torn["bodies"] = json!([]);
+    let notes = |scene: &Value, name: &str| {
+        let file = folder.write(&format!("{name}.json"), &scene.to_string());
+        let output = toile(&["run", path(&file), "--out", path(&folder.0.join(name))]);
+        assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+        text(&output.stdout)
+    };
+    assert!(!notes(&torn, "whole").contains("as long as at rest"));
+    torn["pins"] = json!([{"panel": "square", "edge": 2}, {"panel": "square", "edge": 0, "motion": [
+        {"time": 0.0, "offset": [0, 0, 0]}, {"time": 0.1, "offset": [0, -0.9, 0]}]}]);
+    assert!(notes(&torn, "torn").contains("times as long as at rest"));
+}
+
 /// One that stops before it is at rest ends with a code of its own, its results written.
 #[test]
 fn a_drape_that_stops_at_its_limit_has_an_exit_code() {
