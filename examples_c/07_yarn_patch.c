@@ -1,4 +1,5 @@
-/* A swatch of jersey, every yarn simulated: it is let go for a moment, and its yarns are read.
+/* A swatch of jersey, every yarn simulated: it is let go for a moment, and its yarns are read, as a host draws them
+ * and as numbers.
  *
  * The laws at the end: what relaxes loses energy, yarns keep their order and their length, a held node stays
  * where it is held, and the swatch leaves its plane as jersey does. */
@@ -25,6 +26,47 @@ enum { STEPS = 30 };
     name = malloc((count) * sizeof *name);                                                \
     HOLDS(name != NULL);                                                                  \
     CALL(toile_sim_##name(sim, name, count, NULL))
+
+/* length of a polyline */
+static double along(const double *points, size_t count) {
+    double sum = 0;
+    for (size_t k = 1; k < count; ++k) {
+        const double *a = points + 3 * (k - 1), *b = points + 3 * k;
+        sum += sqrt((b[0] - a[0]) * (b[0] - a[0]) + (b[1] - a[1]) * (b[1] - a[1]) +
+                    (b[2] - a[2]) * (b[2] - a[2]));
+    }
+    return sum;
+}
+
+/* what a plug-in needs to draw yarns: points of curves, where each begins, and radii; the length drawn */
+static double draw(const toile_sim *sim) {
+    enum { SAMPLES = 4 };
+    size_t starts = 0, numbers = 0, yarns = 0, panels = 0, fabrics = 0;
+    CALL(toile_sim_yarn_curve_offsets(sim, SAMPLES, NULL, 0, &starts));
+    CALL(toile_sim_yarn_curves(sim, SAMPLES, NULL, 0, &numbers));
+    uint32_t *start = malloc(starts * sizeof *start);
+    double *points = malloc(numbers * sizeof *points);
+    HOLDS(start != NULL && points != NULL);
+    CALL(toile_sim_yarn_curve_offsets(sim, SAMPLES, start, starts, NULL));
+    CALL(toile_sim_yarn_curves(sim, SAMPLES, points, numbers, NULL));
+    READ(double, yarn_radii, sim, yarns);
+    READ(uint32_t, yarn_fabrics, sim, fabrics);
+    READ(uint32_t, yarn_panels, sim, panels);
+    HOLDS(starts == yarns + 1 && fabrics == yarns && panels == yarns);
+    HOLDS(3 * (size_t)start[yarns] == numbers);
+    double length = 0;
+    for (size_t y = 0; y < yarns; ++y) {
+        HOLDS(yarn_radii[y] > 0 && yarn_fabrics[y] == 0 && yarn_panels[y] == 0);
+        /* here the tube of this radius around these points would go to the screen */
+        length += along(points + 3 * (size_t)start[y], start[y + 1] - start[y]);
+    }
+    free(start);
+    free(points);
+    free(yarn_radii);
+    free(yarn_fabrics);
+    free(yarn_panels);
+    return length;
+}
 
 static double yarn_energy(const toile_sim *sim) {
     toile_energies energies;
@@ -94,6 +136,11 @@ int main(void) {
     }
     printf("%-28s %10zu of %zu yarns\n", "nodes", nodes, yarns - 1);
     printf("%-28s %10.4f\n", "length of yarn [m]", length);
+    const double drawn = draw(sim);
+    size_t top = 0;
+    CALL(toile_sim_yarn_nodes_along(sim, 0, 2, NULL, 0, &top));
+    printf("%-28s %10.4f\n", "length as drawn [m]", drawn);
+    printf("%-28s %10zu\n", "nodes along the top", top);
     printf("%-28s %10.4f -> %.4f\n", "yarn energy [mJ]", 1e3 * laid, 1e3 * energy);
     printf("%-28s %10.4f\n", "largest tension [N]", tension);
     printf("%-28s %10.4f\n", "largest compression [N]", compression);
@@ -101,6 +148,9 @@ int main(void) {
     printf("%-28s %10.4f\n", "out of its plane [mm]", 1e3 * height);
 
     HOLDS(energy < 0.9 * laid);
+    /* drawn yarns lie around each other at contacts, which takes more than their straight segments do */
+    HOLDS(drawn > length && drawn < 2 * length);
+    HOLDS(top >= 12);
     for (int k = 0; k < 3; ++k) {
         HOLDS(now[3 * held + k] == home[k]);
     }

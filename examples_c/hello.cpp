@@ -45,6 +45,27 @@ int main() try {
     holds(force[1] < 0, "the cloth weighs on the sphere");
     holds(std::abs(torque[1]) < 1e-2, "nothing turns the sphere");
 
+    // a patch of jersey, its top held, drawn; then its yarns are taken away and the triangles go on
+    auto swatch = toile::garment::from_json(R"({"toile_garment": 1, "edge_length": 0.01,
+        "panels": [{"name": "p", "fabric": "y",
+            "vertices": [[0, 0], [0.02, 0], [0.02, 0.018], [0, 0.018]],
+            "edges": [[0, 1], [1, 2], [2, 3], [3, 0]]}],
+        "fabrics": [{"name": "y", "yarns": {"preset": "jersey"}}]})");
+    swatch.set_blend_region(0, {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}});
+    toile::sim knit(swatch);
+    const auto top = knit.yarn_nodes_along(0, 2);
+    knit.pin_yarn_nodes(top);
+    knit.step(1e-3);
+    const auto curves = knit.yarn_curves(4);
+    std::printf("%zu yarns of %zu points, radius %.2f mm, %zu nodes held\n", curves.size(),
+                curves.front().size(), 1e3 * knit.yarn_radii().front(), top.size());
+    holds(curves.front().size() == 4 * (knit.yarn_indices().size() - 1) + 1, "four to a segment");
+    holds(2 * knit.yarn_nodes().size() == 3 * knit.yarn_uv().size(), "nodes are laid and placed");
+    holds(knit.yarn_changes().passages_gone == 0, "nothing has come off");
+    knit.unpin_yarn_nodes(top);
+    knit.set_blend_region(0, {});
+    holds(knit.yarn_nodes().empty() && knit.yarn_curves(4).empty(), "triangles again");
+
     // errors are exceptions with the library's text
     try {
         sim.step(-1);

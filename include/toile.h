@@ -563,7 +563,7 @@ typedef struct toile_step_report {
      */
     double residual;
     /**
-     * Largest relative stretch of a mesh edge.
+     * Largest relative stretch of a mesh edge, or of a piece of yarn between two nodes.
      */
     double max_edge_strain;
     /**
@@ -1504,6 +1504,74 @@ toile_status toile_sim_yarn_forces(const struct toile_sim *sim,
                                    double *out,
                                    size_t capacity,
                                    size_t *needed);
+
+/**
+ * Radius of each yarn [m], shape [yarn_count]. Sizes as in toile_sim_positions.
+ */
+toile_status toile_sim_yarn_radii(const struct toile_sim *sim,
+                                  double *out,
+                                  size_t capacity,
+                                  size_t *needed);
+
+/**
+ * Fabric of each yarn, counted as in the garment, shape [yarn_count]; rods along seams have the coarser of their two
+ * sides. Sizes as in toile_sim_positions.
+ */
+toile_status toile_sim_yarn_fabrics(const struct toile_sim *sim,
+                                    uint32_t *out,
+                                    size_t capacity,
+                                    size_t *needed);
+
+/**
+ * Panel in which each yarn was laid, shape [yarn_count]; rods along seams lie in one of the two. Sizes as in
+ * toile_sim_positions.
+ */
+toile_status toile_sim_yarn_panels(const struct toile_sim *sim,
+                                   uint32_t *out,
+                                   size_t capacity,
+                                   size_t *needed);
+
+/**
+ * Where each node was laid in its panel, flat coordinates [m], shape [node_count, 2]. Sizes as in
+ * toile_sim_positions.
+ */
+toile_status toile_sim_yarn_uv(const struct toile_sim *sim,
+                               double *out,
+                               size_t capacity,
+                               size_t *needed);
+
+/**
+ * Where the points of each yarn begin in toile_sim_yarn_curves of the same `samples`, shape [yarn_count + 1]; the last
+ * number is the number of points. It changes when the epoch of toile_sim_yarn_changes does. Sizes as in toile_sim_positions.
+ */
+toile_status toile_sim_yarn_curve_offsets(const struct toile_sim *sim,
+                                          uint32_t samples,
+                                          uint32_t *out,
+                                          size_t capacity,
+                                          size_t *needed);
+
+/**
+ * Yarns as they are drawn: points of smooth centre lines, `samples` pieces (1 to 64) between two nodes, which run beside each
+ * other where yarns cross [m], shape [point_count, 3], yarn after yarn; a tube of toile_sim_yarn_radii around each is the
+ * yarn. Sizes as in toile_sim_positions; asking for the number makes no points.
+ */
+toile_status toile_sim_yarn_curves(const struct toile_sim *sim,
+                                   uint32_t samples,
+                                   double *out,
+                                   size_t capacity,
+                                   size_t *needed);
+
+/**
+ * Nodes of the border of a panel's yarns along one of its edges, rising: those on the edge, or with none before them
+ * where a piece lies away from it, as a pin with `edge` in a scene holds them. Empty where no yarns are simulated. Sizes as
+ * in toile_sim_positions. TOILE_E_ARGUMENT names a panel or an edge that does not exist.
+ */
+toile_status toile_sim_yarn_nodes_along(const struct toile_sim *sim,
+                                        uint32_t panel,
+                                        uint32_t edge,
+                                        uint32_t *out,
+                                        size_t capacity,
+                                        size_t *needed);
 
 /**
  * What has changed since the yarns were laid: contacts that yarns came out of. `epoch` grows with every step, drape,

@@ -18,6 +18,7 @@
 
 namespace toile {
 
+using vec2 = std::array<double, 2>;
 using vec3 = std::array<double, 3>;
 
 /// What a call answered when it was not TOILE_OK.
@@ -62,6 +63,11 @@ std::string text(Call call) {
     return std::string(out.data());
 }
 
+/// Flat points as plain numbers, row-major.
+inline const double *flat(const std::vector<vec2> &points) {
+    return points.empty() ? nullptr : points.front().data();
+}
+
 /// A struct with its defaults.
 template <class T, class Init>
 T filled(Init init) {
@@ -94,6 +100,9 @@ inline toile_drape_desc drape_desc() {
 inline toile_step_report step_report() {
     return detail::filled<toile_step_report>(toile_step_report_init);
 }
+inline toile_suggest_desc suggest_desc() {
+    return detail::filled<toile_suggest_desc>(toile_suggest_desc_init);
+}
 
 /// Flat panels, seams, fabrics.
 class garment {
@@ -121,6 +130,16 @@ public:
     void set_fabric(std::string_view json) {
         check(toile_garment_set_fabric(handle_.get(), json.data(), json.size()));
     }
+    /// Every yarn inside a polygon of a panel, flat coordinates.
+    void set_blend_region(std::uint32_t panel, const std::vector<vec2> &polygon,
+                          std::uint32_t rings = 0) {
+        check(toile_garment_set_blend_region(handle_.get(), panel, detail::flat(polygon),
+                                             polygon.size(), rings));
+    }
+    void set_blend_vertices(const std::vector<double> &alpha, std::uint32_t rings = 0) {
+        check(toile_garment_set_blend_vertices(handle_.get(), alpha.data(), alpha.size(), rings));
+    }
+    void clear_blend_region() { check(toile_garment_clear_blend_region(handle_.get())); }
     std::uint32_t panel_count() const {
         std::uint32_t count = 0;
         check(toile_garment_panel_count(handle_.get(), &count));
@@ -344,6 +363,157 @@ public:
         auto out = detail::filled<toile_energies>(toile_energies_init);
         check(toile_sim_energies(handle_.get(), &out));
         return out;
+    }
+    /// Nodes of yarns, positions as in toile_sim_yarn_nodes.
+    std::vector<double> yarn_nodes() const {
+        return detail::array<double>([this](double *out, std::size_t n, std::size_t *needed) {
+            return toile_sim_yarn_nodes(handle_.get(), out, n, needed);
+        });
+    }
+    std::vector<double> yarn_uv() const {
+        return detail::array<double>([this](double *out, std::size_t n, std::size_t *needed) {
+            return toile_sim_yarn_uv(handle_.get(), out, n, needed);
+        });
+    }
+    std::vector<std::uint32_t> yarn_offsets() const {
+        return detail::array<std::uint32_t>([this](std::uint32_t *out, std::size_t n, std::size_t *needed) {
+            return toile_sim_yarn_offsets(handle_.get(), out, n, needed);
+        });
+    }
+    std::vector<std::uint32_t> yarn_indices() const {
+        return detail::array<std::uint32_t>([this](std::uint32_t *out, std::size_t n, std::size_t *needed) {
+            return toile_sim_yarn_indices(handle_.get(), out, n, needed);
+        });
+    }
+    std::vector<double> yarn_coordinates() const {
+        return detail::array<double>([this](double *out, std::size_t n, std::size_t *needed) {
+            return toile_sim_yarn_coordinates(handle_.get(), out, n, needed);
+        });
+    }
+    std::vector<double> yarn_tensions() const {
+        return detail::array<double>([this](double *out, std::size_t n, std::size_t *needed) {
+            return toile_sim_yarn_tensions(handle_.get(), out, n, needed);
+        });
+    }
+    std::vector<double> yarn_compressions() const {
+        return detail::array<double>([this](double *out, std::size_t n, std::size_t *needed) {
+            return toile_sim_yarn_compressions(handle_.get(), out, n, needed);
+        });
+    }
+    std::vector<double> yarn_slips() const {
+        return detail::array<double>([this](double *out, std::size_t n, std::size_t *needed) {
+            return toile_sim_yarn_slips(handle_.get(), out, n, needed);
+        });
+    }
+    std::vector<double> yarn_forces() const {
+        return detail::array<double>([this](double *out, std::size_t n, std::size_t *needed) {
+            return toile_sim_yarn_forces(handle_.get(), out, n, needed);
+        });
+    }
+    std::vector<std::uint8_t> yarn_active() const {
+        return detail::array<std::uint8_t>([this](std::uint8_t *out, std::size_t n, std::size_t *needed) {
+            return toile_sim_yarn_active(handle_.get(), out, n, needed);
+        });
+    }
+    std::vector<double> yarn_radii() const {
+        return detail::array<double>([this](double *out, std::size_t n, std::size_t *needed) {
+            return toile_sim_yarn_radii(handle_.get(), out, n, needed);
+        });
+    }
+    std::vector<std::uint32_t> yarn_fabrics() const {
+        return detail::array<std::uint32_t>([this](std::uint32_t *out, std::size_t n, std::size_t *needed) {
+            return toile_sim_yarn_fabrics(handle_.get(), out, n, needed);
+        });
+    }
+    std::vector<std::uint32_t> yarn_panels() const {
+        return detail::array<std::uint32_t>([this](std::uint32_t *out, std::size_t n, std::size_t *needed) {
+            return toile_sim_yarn_panels(handle_.get(), out, n, needed);
+        });
+    }
+    std::vector<std::uint8_t> vertex_active() const {
+        return detail::array<std::uint8_t>([this](std::uint8_t *out, std::size_t n, std::size_t *needed) {
+            return toile_sim_vertex_active(handle_.get(), out, n, needed);
+        });
+    }
+    std::vector<double> vertex_errors() const {
+        return detail::array<double>([this](double *out, std::size_t n, std::size_t *needed) {
+            return toile_sim_vertex_errors(handle_.get(), out, n, needed);
+        });
+    }
+    /// Points of each yarn as it is drawn, with `samples` pieces between two nodes.
+    std::vector<std::vector<vec3>> yarn_curves(std::uint32_t samples) const {
+        const auto starts = detail::array<std::uint32_t>(
+            [&](std::uint32_t *out, std::size_t n, std::size_t *needed) {
+                return toile_sim_yarn_curve_offsets(handle_.get(), samples, out, n, needed);
+            });
+        const auto points =
+            detail::array<double>([&](double *out, std::size_t n, std::size_t *needed) {
+                return toile_sim_yarn_curves(handle_.get(), samples, out, n, needed);
+            });
+        std::vector<std::vector<vec3>> curves;
+        for (std::size_t y = 0; y + 1 < starts.size(); ++y) {
+            std::vector<vec3> curve;
+            for (std::size_t k = starts[y]; k < starts[y + 1]; ++k) {
+                curve.push_back({points[3 * k], points[3 * k + 1], points[3 * k + 2]});
+            }
+            curves.push_back(std::move(curve));
+        }
+        return curves;
+    }
+    std::vector<std::uint32_t> yarn_nodes_along(std::uint32_t panel, std::uint32_t edge) const {
+        return detail::array<std::uint32_t>(
+            [&](std::uint32_t *out, std::size_t n, std::size_t *needed) {
+                return toile_sim_yarn_nodes_along(handle_.get(), panel, edge, out, n, needed);
+            });
+    }
+    std::uint32_t locate_yarn_node(std::uint32_t panel, double u, double v) const {
+        const double uv[2] = {u, v};
+        std::uint32_t node = TOILE_NONE;
+        check(toile_sim_locate_yarn_node(handle_.get(), panel, uv, &node));
+        return node;
+    }
+    std::uint32_t yarn_end(std::uint32_t yarn, std::uint32_t end) const {
+        std::uint32_t node = TOILE_NONE;
+        check(toile_sim_yarn_end(handle_.get(), yarn, end, &node));
+        return node;
+    }
+    void pin_yarn_nodes(const std::vector<std::uint32_t> &nodes) {
+        check(toile_sim_pin_yarn_nodes(handle_.get(), nodes.data(), nodes.size(), nullptr));
+    }
+    void pin_yarn_nodes(const std::vector<std::uint32_t> &nodes, const std::vector<vec3> &targets) {
+        if (nodes.size() != targets.size()) {
+            throw std::invalid_argument("toile::sim::pin_yarn_nodes: as many targets as nodes");
+        }
+        check(toile_sim_pin_yarn_nodes(handle_.get(), nodes.data(), nodes.size(),
+                                       targets.empty() ? nullptr : targets.front().data()));
+    }
+    void unpin_yarn_nodes(const std::vector<std::uint32_t> &nodes) {
+        check(toile_sim_unpin_yarn_nodes(handle_.get(), nodes.data(), nodes.size()));
+    }
+    toile_yarn_changes yarn_changes() const {
+        auto out = detail::filled<toile_yarn_changes>(toile_yarn_changes_init);
+        check(toile_sim_yarn_changes(handle_.get(), &out));
+        return out;
+    }
+    /// Moves the region of a panel in which every yarn is simulated; an empty polygon takes it away.
+    void set_blend_region(std::uint32_t panel, const std::vector<vec2> &polygon,
+                          std::uint32_t rings = 0) {
+        check(toile_sim_set_blend_region(handle_.get(), panel, detail::flat(polygon),
+                                         polygon.size(), rings));
+    }
+    void set_blend_vertices(const std::vector<double> &alpha, std::uint32_t rings = 0) {
+        check(toile_sim_set_blend_vertices(handle_.get(), alpha.data(), alpha.size(), rings));
+    }
+    /// The region in which yarns would change the answer, and what it leaves and costs.
+    std::pair<std::vector<double>, toile_suggestion> suggest_region(
+        const toile_suggest_desc &desc) const {
+        auto found = detail::filled<toile_suggestion>(toile_suggestion_init);
+        std::uint32_t count = 0;
+        check(toile_sim_vertex_count(handle_.get(), &count));
+        std::vector<double> alpha(count);
+        check(toile_sim_suggest_region(handle_.get(), &desc, alpha.data(), alpha.size(), nullptr,
+                                       &found));
+        return {std::move(alpha), found};
     }
     std::vector<std::uint8_t> save() const {
         return detail::array<std::uint8_t>(

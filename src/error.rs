@@ -62,7 +62,7 @@ impl Error {
     pub fn new(status: Status, message: impl Into<String>) -> Self {
         Self {
             status,
-            message: message.into(),
+            message: short_numbers(message.into()),
         }
     }
 
@@ -72,6 +72,32 @@ impl Error {
         self.message = format!("{place}: {}", self.message);
         self
     }
+}
+
+/// Longest number that is told digit by digit; none that a text shows for its digits is longer.
+const MOST_DIGITS: usize = 24;
+
+/// The text with its very long numbers as powers of ten: `1e300`, not a one and 300 zeros.
+fn short_numbers(text: String) -> String {
+    let part_of_number = |c: char| c.is_ascii_digit() || c == '.';
+    let long = |run: &str| run.len() > MOST_DIGITS && run.parse::<f64>().is_ok();
+    let runs = || text.split(|c: char| !part_of_number(c));
+    if !runs().any(long) {
+        return text;
+    }
+    let mut short = String::new();
+    let mut rest = &*text;
+    for run in runs() {
+        match run.parse::<f64>() {
+            Ok(value) if long(run) => short.push_str(&format!("{value:e}")),
+            _ => short.push_str(run),
+        }
+        rest = &rest[run.len()..];
+        let between = rest.chars().next();
+        short.extend(between);
+        rest = &rest[between.map_or(0, char::len_utf8)..];
+    }
+    short
 }
 
 impl fmt::Display for Error {
@@ -126,4 +152,28 @@ constructors! {
     material => Material,
     limit => Limit,
     io => Io,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn very_long_numbers_are_told_as_powers_of_ten() {
+        for (text, told) in [
+            (
+                format!("dt = {} s: too long", 1e300),
+                "dt = 1e300 s: too long",
+            ),
+            (format!("-{}, {}", 1e-300, 2.5e40), "-1e-300, 2.5e40"),
+            (
+                format!("0.0008275868534480223 of {}", u64::MAX),
+                "0.0008275868534480223 of 18446744073709551615",
+            ),
+            ("Länge 1".to_owned(), "Länge 1"),
+            (format!("ä{}ö", 1e30), "ä1e30ö"),
+        ] {
+            assert_eq!(Error::argument(text).message, told);
+        }
+    }
 }

@@ -246,8 +246,8 @@ fn finite(what: &str, values: &[f64]) -> Result<()> {
 fn finite_points(what: &str, points: &[Vec3]) -> Result<()> {
     match points.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
         Some(i) => Err(Error::argument(format!(
-            "{what} {i} = {:?} must be finite",
-            points[i]
+            "{what} {i} = ({}, {}, {}) must be finite",
+            points[i].x, points[i].y, points[i].z
         ))),
         None => Ok(()),
     }

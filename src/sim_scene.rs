@@ -105,7 +105,13 @@ fn place(sim: &Sim, panel: u32, place: PinPlace) -> Result<Vec<u32>> {
             let vertices = along(sim, panel, edge)?.iter().copied();
             let nodes = sim.yarn_nodes_along(panel, edge)?.into_iter();
             let all = vertices.chain(nodes.map(|n| sim.point_of_node(n)));
-            return Ok(sorted(all.filter(|p| sim.moves_by_itself(*p)).collect()));
+            let held = sorted(all.filter(|p| sim.moves_by_itself(*p)).collect());
+            if held.is_empty() {
+                return Err(Error::argument(format!(
+                    "edge {edge} of panel {panel} holds nothing: no vertex and no yarn node along it moves by itself"
+                )));
+            }
+            return Ok(held);
         }
         PinPlace::Yarn { yarn, end: None } => sim.yarn(yarn)?,
         PinPlace::Yarn {

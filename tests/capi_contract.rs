@@ -74,6 +74,13 @@ fn with_sim(sim: *mut toile_sim) -> Vec<(&'static str, toile_status)> {
         toile_sim_yarn_slips(ptr::null_mut(), 0, n),
         toile_sim_yarn_active(ptr::null_mut(), 0, n),
         toile_sim_yarn_forces(ptr::null_mut(), 0, n),
+        toile_sim_yarn_radii(ptr::null_mut(), 0, n),
+        toile_sim_yarn_fabrics(ptr::null_mut(), 0, n),
+        toile_sim_yarn_panels(ptr::null_mut(), 0, n),
+        toile_sim_yarn_uv(ptr::null_mut(), 0, n),
+        toile_sim_yarn_curve_offsets(1, ptr::null_mut(), 0, n),
+        toile_sim_yarn_curves(1, ptr::null_mut(), 0, n),
+        toile_sim_yarn_nodes_along(0, 0, ptr::null_mut(), 0, n),
         toile_sim_yarn_changes(&mut changes),
         toile_sim_suggest_region(&wish, ptr::null_mut(), 0, n, ptr::null_mut()),
         toile_sim_vertex_errors(ptr::null_mut(), 0, n),
@@ -334,6 +341,8 @@ fn arrays_are_copied_out_in_two_calls_or_not_at_all() {
         toile_sim_yarn_tensions,
         toile_sim_yarn_compressions,
         toile_sim_yarn_slips,
+        toile_sim_yarn_radii,
+        toile_sim_yarn_uv,
     ] {
         check(&sim, call, -7e77);
     }
@@ -342,6 +351,8 @@ fn arrays_are_copied_out_in_two_calls_or_not_at_all() {
         toile_sim_vertex_panels,
         toile_sim_yarn_offsets,
         toile_sim_yarn_indices,
+        toile_sim_yarn_fabrics,
+        toile_sim_yarn_panels,
     ] {
         check(&sim, call, 0xdead_beef);
     }

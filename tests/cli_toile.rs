@@ -146,6 +146,43 @@ fn run_writes_a_complete_summary_models_pattern_and_picture() {
     }
 }
 
+/// Cloth pulled to four times its length is simulated, and the report says what that is worth.
+#[test]
+fn what_is_torn_in_truth_is_noted() {
+    let folder = Folder::new("torn");
+    let mut torn = scene();
+    torn["bodies"] = json!([]);
+    let notes = |scene: &Value, name: &str| {
+        let file = folder.write(&format!("{name}.json"), &scene.to_string());
+        let output = toile(&["run", path(&file), "--out", path(&folder.0.join(name))]);
+        assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+        text(&output.stdout)
+    };
+    assert!(!notes(&torn, "whole").contains("as long as at rest"));
+    torn["pins"] = json!([{"panel": "square", "edge": 2}, {"panel": "square", "edge": 0, "motion": [
+        {"time": 0.0, "offset": [0, 0, 0]}, {"time": 0.1, "offset": [0, -0.9, 0]}]}]);
+    assert!(notes(&torn, "torn").contains("times as long as at rest"));
+}
+
+/// One that stops before it is at rest ends with a code of its own, its results written.
+#[test]
+fn a_drape_that_stops_at_its_limit_has_an_exit_code() {
+    let folder = Folder::new("limit");
+    let mut short = scene();
+    short["numbers"] = json!({"solver.drape.max_steps": 1});
+    short["run"] = json!({"drape": true, "duration": 0.02, "dt": 0.02});
+    let scene = folder.write("scene.json", &short.to_string());
+    let out = folder.0.join("out");
+    let output = toile(&["run", path(&scene), "--out", path(&out)]);
+    assert_eq!(code(&output), 5, "{}", text(&output.stderr));
+    let summary: Value =
+        serde_json::from_slice(&std::fs::read(out.join("summary.json")).unwrap()).unwrap();
+    assert_eq!(summary["outcome"], "iteration_limit");
+    assert!(text(&output.stdout).contains("yarn nodes"));
+    let help = toile(&["--help"]);
+    assert!(text(&help.stdout).contains("5 a drape did not come to rest"));
+}
+
 #[test]
 fn a_garment_that_nothing_holds_ends_its_drape_and_the_summary_says_so() {
     let folder = Folder::new("falling");
@@ -157,7 +194,7 @@ fn a_garment_that_nothing_holds_ends_its_drape_and_the_summary_says_so() {
     let scene = folder.write("scene.json", &free.to_string());
     let out = folder.0.join("out");
     let output = toile(&["run", path(&scene), "--out", path(&out)]);
-    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    assert_eq!(code(&output), 5, "{}", text(&output.stderr));
     assert!(text(&output.stdout).contains("fall for ever"));
     let summary: Value =
         serde_json::from_slice(&std::fs::read(out.join("summary.json")).unwrap()).unwrap();

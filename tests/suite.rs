@@ -138,6 +138,8 @@ mod tri_real;
 mod yarn_charts;
 #[path = "yarn_contacts.rs"]
 mod yarn_contacts;
+#[path = "yarn_edges.rs"]
+mod yarn_edges;
 #[path = "yarn_fabrics.rs"]
 mod yarn_fabrics;
 #[path = "yarn_friction.rs"]

@@ -8,7 +8,7 @@ use toile::math::Vec2;
 use toile::pattern::chart::{Chart, Face, Notation, Stack, Stitch};
 use toile::pattern::export::{fabric_to_json, garment_to_json};
 use toile::pattern::import::{fabric_from_json, garment_from_json};
-use toile::pattern::yarn_fabric::{Mask, PRESETS, Structure};
+use toile::pattern::yarn_fabric::{Mask, PRESETS, Structure, WEAVES};
 use toile::pattern::{Fabric, YarnFabric};
 use toile::yarn::YarnMaterial;
 
@@ -317,6 +317,18 @@ fn yarns_that_cannot_be_laid_are_refused_with_the_reason() {
             r#""weave": ["x.", "x"], "warp_pitch": 1, "radius": 0.1"#,
             "row 2 column 2",
         ),
+        (
+            r#""weave": ["x"], "warp_pitch": 1, "radius": 0.1"#,
+            "row 1: weft 1 lies behind all warp yarns",
+        ),
+        (
+            r#""weave": ["x.", "..", ".x"], "warp_pitch": 1, "radius": 0.1"#,
+            "row 2: weft 2 lies in front of all warp yarns",
+        ),
+        (
+            r#""weave": ["x.x", ".xx"], "warp_pitch": 1, "radius": 0.1"#,
+            "column 3: warp 3 lies in front of all weft yarns",
+        ),
         (r#""weave": "plain", "radius": 1e-4"#, "warp_pitch"),
         (r#""radius": 1e-4"#, "preset"),
         (
@@ -342,8 +354,21 @@ fn weaves_follow_their_rules() {
         assert_eq!(over("twill 3/1", i, j), (i + j) % 4 < 3);
         assert_eq!(over("satin 5", i, j), (2 * i + j) % 5 == 0);
     }
-    let own = Mask::from_lines(&["x..", ".x."]).unwrap();
-    assert!(own.warp_over(3, 2) && own.warp_over(1, 1) && !own.warp_over(2, 3));
+    // every yarn of them changes sides, as those of masks must
+    for name in WEAVES {
+        let mask = Mask::preset(name).unwrap();
+        let [width, height] = mask.size();
+        let lines: Vec<String> = (0..height)
+            .map(|j| {
+                let sign = |i| if mask.warp_over(i, j) { 'x' } else { '.' };
+                (0..width).map(sign).collect()
+            })
+            .collect();
+        let lines: Vec<&str> = lines.iter().map(String::as_str).collect();
+        assert_eq!(Mask::from_lines(&lines).expect(name), mask);
+    }
+    let own = Mask::from_lines(&["x..", ".xx"]).unwrap();
+    assert!(own.warp_over(3, 2) && own.warp_over(1, 1) && !own.warp_over(2, 2));
 }
 
 #[test]

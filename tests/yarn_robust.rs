@@ -6,6 +6,7 @@ use crate::sheets::Random;
 use crate::yarn_sims::{WHOLE, knit, patch, sim};
 use toile::body::Body;
 use toile::math::{Rotation, Vec3};
+use toile::pattern::yarn_fabric::Mask;
 use toile::sim::{ContactSettings, DrapeOptions, Outcome, Sim};
 
 fn grows(sim: &Sim) {
@@ -16,7 +17,7 @@ fn grows(sim: &Sim) {
     }
 }
 
-/// A patch of a fabric at random: weave or knit, any mask or chart of knits and purls, stiffness over two orders of
+/// A patch of a fabric at random: weave or knit, any mask that interlaces or chart of knits and purls, stiffness over two orders of
 /// magnitude, friction from none to 2.
 fn random_patch(seed: u64) -> (String, [f64; 2]) {
     let mut random = Random::new(seed);
@@ -28,9 +29,16 @@ fn random_patch(seed: u64) -> (String, [f64; 2]) {
     let pitch = 1e-3 * 4_f64.powf(part());
     let radius = pitch * (0.1 + 0.15 * part());
     let signs = if woven { ['x', '.'] } else { ['-', '.'] };
-    let rows: Vec<String> = (0..4)
-        .map(|_| (0..4).map(|_| signs[usize::from(part() < 0.5)]).collect())
-        .collect();
+    let rows = loop {
+        let rows: Vec<String> = (0..4)
+            .map(|_| (0..4).map(|_| signs[usize::from(part() < 0.5)]).collect())
+            .collect();
+        let lines: Vec<&str> = rows.iter().map(String::as_str).collect();
+        // yarns that do not change sides make no weave
+        if !woven || Mask::from_lines(&lines).is_ok() {
+            break rows;
+        }
+    };
     let (key, size) = match woven {
         true => ("weave", "warp_pitch"),
         false => ("chart", "loop_width"),

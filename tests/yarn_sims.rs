@@ -249,3 +249,49 @@ fn a_loose_weave_falls_onto_a_drum() {
     assert_eq!(sim.yarn_changes().passages_gone, 0);
     assert!(sim.yarn_slips().iter().all(|s| s.abs() < 1e-3));
 }
+
+/// A point cannot be at two places: two targets for one are refused and hold nothing, the same one twice is taken.
+#[test]
+fn two_targets_for_one_node_are_refused() {
+    let mut sim = sim(
+        &patch(r#"{"preset": "jersey"}"#, 0.02, 0.018, WHOLE),
+        0.0,
+        &[],
+    );
+    let node = sim.yarn_end(0, 0).unwrap();
+    let other = sim.yarn_end(0, 1).unwrap();
+    let at = |x: f64| [x, 0.0, 0.0];
+    let refused = sim.pin_yarn_nodes(&[node, other, node], Some(&[at(0.0), at(1.0), at(0.001)]));
+    let message = refused.unwrap_err().message;
+    assert!(message.contains("two targets"), "{message}");
+    assert!(message.contains(&format!("yarn node {node}")), "{message}");
+    assert!(!sim.is_pinned(sim.point_of_node(node)));
+    sim.pin_yarn_nodes(&[node, node], Some(&[at(0.0); 2]))
+        .unwrap();
+    assert!(sim.is_pinned(sim.point_of_node(node)));
+}
+
+/// Hybrid rings of triangles finer than the yarns join nothing, and what was built says so.
+#[test]
+fn rings_that_join_no_vertex_are_told() {
+    let region = "[[0.008, 0.008], [0.016, 0.008], [0.016, 0.016], [0.008, 0.016]]";
+    let notes = |edge: f64, rings: u32| {
+        let weave = r#"{"weave": "plain", "warp_pitch": 0.002, "radius": 0.0005}"#;
+        let text = patch(weave, 0.024, 0.024, region)
+            .replace(&format!("{}", 0.2 * 0.024), &format!("{edge}"))
+            .replace(r#""polygon""#, &format!(r#""rings": {rings}, "polygon""#));
+        sim(&text, 0.0, &[]).info().notes
+    };
+    let told = notes(0.001, 1);
+    assert!(
+        told.iter().any(|n| n.contains("join no vertex")),
+        "{told:?}"
+    );
+    for (edge, rings) in [(0.001, 0), (0.004, 1)] {
+        let told = notes(edge, rings);
+        assert!(
+            !told.iter().any(|n| n.contains("rings")),
+            "{edge} {rings}: {told:?}"
+        );
+    }
+}

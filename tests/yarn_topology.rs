@@ -550,3 +550,43 @@ fn scenes_hold_yarns_by_place_and_by_number() {
     }
     assert!(nodes(&sim).is_empty());
 }
+
+/// The first end of lace torn away in one step takes stitches with it, until two strands of one contact share the node that
+/// they turn at: the mesh that is left holds, and every yarn keeps its length.
+#[test]
+fn an_end_torn_off_in_one_step_leaves_a_mesh_that_holds() {
+    let lace = r#"{"chart": ["./o.", "...."], "loop_width": 0.004, "radius": 0.001, "fastened": false, "friction": 0}"#;
+    let mut sim = sim(&patch(lace, 0.0291, 0.0175, WHOLE), 0.0, &[]);
+    let before = length(sim.yarns().unwrap(), sim.yarn_coordinates());
+    let end = sim.yarn_end(0, 0).unwrap();
+    let way = Vec3::new(0.3456, 0.8216, 0.3304).normalize() * 0.064;
+    let target = sim.yarn_nodes()[end as usize] + way;
+    sim.pin_yarn_nodes(&[end], Some(&[target.into()])).unwrap();
+    sim.step(8e-3).expect("step");
+    order(&sim);
+    let changes = sim.yarn_changes();
+    assert!(changes.passages_gone > 0 && changes.nodes_split > 0);
+    let now = length(sim.yarns().unwrap(), sim.yarn_coordinates());
+    assert_eq!(before, now);
+}
+
+/// A step that fails leaves the state, the memory that hosts look at, and the epoch.
+#[test]
+fn a_step_that_fails_leaves_everything() {
+    let mut sim = sim(
+        &patch(r#"{"preset": "jersey"}"#, 0.0192, 0.0171, WHOLE),
+        0.0,
+        &[
+            ("solver.newton.max_iterations", 1.0),
+            ("solver.step.min", 1e-3),
+        ],
+    );
+    let end = sim.yarn_end(0, 1).unwrap();
+    let target = sim.yarn_nodes()[end as usize] + Vec3::new(0.2, 0.2, 0.0);
+    sim.pin_yarn_nodes(&[end], Some(&[target.into()])).unwrap();
+    let before = (sim.save().unwrap(), sim.epoch(), sim.yarn_epoch());
+    let at = sim.positions().as_ptr();
+    sim.step(1e-3).expect_err("one iteration cannot do it");
+    assert_eq!(before, (sim.save().unwrap(), sim.epoch(), sim.yarn_epoch()));
+    assert_eq!(at, sim.positions().as_ptr());
+}

@@ -241,6 +241,23 @@ def test_yarns_of_a_panel_are_read_and_held():
         assert sim.yarn_compressions.min() >= 0 and np.abs(sim.yarn_slips).max() > 0
         for start, end in zip(sim.yarn_offsets, sim.yarn_offsets[1:]):
             assert (np.diff(sim.yarn_coordinates[start:end]) > 0).all()
+        curves = sim.yarn_curves(3)
+        assert len(curves) == len(sim.yarn_radii) == len(sim.yarn_offsets) - 1
+        assert (sim.yarn_radii == 7.5e-4).all()
+        assert not sim.yarn_fabrics.any() and not sim.yarn_panels.any()
+        for curve, start, end in zip(curves, sim.yarn_offsets, sim.yarn_offsets[1:]):
+            assert curve.shape == (3 * (end - start - 1) + 1, 3)
+            # crossing yarns lie beside each other, and ends where they are
+            apart = np.linalg.norm(curve[::3] - sim.yarn_nodes[nodes[start:end]], axis=1)
+            assert apart.max() < 7.6e-4 and apart[0] == apart[-1] == 0
+        with pytest.raises(toile.UsageError, match="samples"):
+            sim.yarn_curves(0)
+        uv = sim.yarn_uv
+        assert np.allclose(uv[:, 0], x[:, 0]) and np.allclose(uv[:, 1], x[:, 1])
+        top = sim.yarn_nodes_along(0, 2)
+        assert len(top) >= 12 and (uv[top, 1] > uv[:, 1].max() - 1e-3).all()
+        with pytest.raises(toile.UsageError, match="no edge 4"):
+            sim.yarn_nodes_along(0, 4)
         sim.unpin_yarn_nodes(held)
         with pytest.raises(toile.ToileError):
             sim.unpin_yarn_nodes(held)

@@ -286,6 +286,16 @@ FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
     "toile_sim_yarn_slips": (c_int32, _copy_f64),
     "toile_sim_yarn_active": (c_int32, [handle, POINTER(c_uint8), c_size_t, _size]),
     "toile_sim_yarn_forces": (c_int32, _copy_f64),
+    "toile_sim_yarn_radii": (c_int32, _copy_f64),
+    "toile_sim_yarn_fabrics": (c_int32, _copy_u32),
+    "toile_sim_yarn_panels": (c_int32, _copy_u32),
+    "toile_sim_yarn_uv": (c_int32, _copy_f64),
+    "toile_sim_yarn_curve_offsets": (c_int32, [handle, c_uint32, _u32, c_size_t, _size]),
+    "toile_sim_yarn_curves": (c_int32, [handle, c_uint32, _f64, c_size_t, _size]),
+    "toile_sim_yarn_nodes_along": (
+        c_int32,
+        [handle, c_uint32, c_uint32, _u32, c_size_t, _size],
+    ),
     "toile_sim_suggest_region": (
         c_int32,
         [handle, _p("toile_suggest_desc"), _f64, c_size_t, _size, _p("toile_suggestion")],

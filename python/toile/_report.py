@@ -32,6 +32,7 @@ class Report:
     advanced: float
     #: Largest force on a free vertex [N].
     residual: float
+    #: Largest relative stretch of a mesh edge, or of a piece of yarn between two nodes.
     max_edge_strain: float
     #: Smallest distance of a vertex to a body [m]; infinite without bodies.
     min_gap: float

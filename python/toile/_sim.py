@@ -352,6 +352,37 @@ class Sim(_Owner):
         """Force on each node [N], shape (nodes, 3): on a held one what its holder bears."""
         return _copy(lib.toile_sim_yarn_forces, np.float64, self.handle).reshape(-1, 3)
 
+    @property
+    def yarn_radii(self) -> np.ndarray:
+        """Radius of each yarn [m], shape (yarns,)."""
+        return _copy(lib.toile_sim_yarn_radii, np.float64, self.handle)
+
+    @property
+    def yarn_fabrics(self) -> np.ndarray:
+        """Fabric of each yarn, counted as in the garment, shape (yarns,)."""
+        return _copy(lib.toile_sim_yarn_fabrics, np.uint32, self.handle)
+
+    @property
+    def yarn_panels(self) -> np.ndarray:
+        """Panel in which each yarn was laid, shape (yarns,)."""
+        return _copy(lib.toile_sim_yarn_panels, np.uint32, self.handle)
+
+    @property
+    def yarn_uv(self) -> np.ndarray:
+        """Where each node was laid in its panel [m], shape (nodes, 2)."""
+        return _copy(lib.toile_sim_yarn_uv, np.float64, self.handle).reshape(-1, 2)
+
+    def yarn_curves(self, samples: int = 4) -> list[np.ndarray]:
+        """Yarns as they are drawn: for each the points of its smooth centre line [m], shape (points, 3), `samples` pieces
+        between two nodes; a tube of :attr:`yarn_radii` around it is the yarn."""
+        starts = _copy(lib.toile_sim_yarn_curve_offsets, np.uint32, self.handle, samples)
+        points = _copy(lib.toile_sim_yarn_curves, np.float64, self.handle, samples)
+        return np.split(points.reshape(-1, 3), starts[1:-1]) if len(starts) > 1 else []
+
+    def yarn_nodes_along(self, panel: int, edge: int) -> np.ndarray:
+        """Nodes of the border of a panel's yarns along one of its edges, as a pin with `edge` in a scene holds them."""
+        return _copy(lib.toile_sim_yarn_nodes_along, np.uint32, self.handle, panel, edge)
+
     def suggest_region(
         self, tolerance: float = 0.0, budget: int = 0, rings: int = 0
     ) -> tuple[np.ndarray, Suggestion]:

@@ -96,10 +96,10 @@ impl Factor {
         }
         let failed = |what: String| Error::new(Status::LinearSolve, format!("filter: {what}"));
         let matrix = SparseColMat::<usize, f64>::try_new_from_triplets(n, n, &triplets)
-            .map_err(|e| failed(format!("{e:?}")))?;
+            .map_err(|e| failed(e.to_string()))?;
         let llt = matrix
             .sp_cholesky(Side::Lower)
-            .map_err(|e| failed(format!("{e:?}")))?;
+            .map_err(|e| failed(e.to_string()))?;
         Ok(Self { n, llt: Some(llt) })
     }
 

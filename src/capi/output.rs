@@ -18,26 +18,12 @@ pub(super) unsafe fn copy<T: Copy>(
     capacity: usize,
     needed: *mut usize,
 ) -> Result<()> {
-    if out.is_null() && needed.is_null() {
-        return Err(Error::argument("out and needed are both NULL"));
+    // SAFETY: handed on.
+    if !unsafe { takes(data.len(), out, capacity, needed)? } {
+        return Ok(());
     }
     // SAFETY: not NULL is valid; `data` fits; the memory may overlap when `out` is a view's.
     unsafe {
-        if !needed.is_null() {
-            needed.write_unaligned(data.len());
-        }
-        if out.is_null() {
-            return Ok(());
-        }
-        if capacity < data.len() {
-            return Err(Error::new(
-                Status::Size,
-                format!(
-                    "capacity {capacity} is below the {} elements needed",
-                    data.len()
-                ),
-            ));
-        }
         ptr::copy(
             data.as_ptr().cast::<u8>(),
             out.cast::<u8>(),
@@ -45,6 +31,29 @@ pub(super) unsafe fn copy<T: Copy>(
         );
     }
     Ok(())
+}
+
+/// Tells the number of elements; whether they are to be copied too, so that none are made where only it is asked for.
+pub(super) unsafe fn takes<T>(
+    count: usize,
+    out: *mut T,
+    capacity: usize,
+    needed: *mut usize,
+) -> Result<bool> {
+    if out.is_null() && needed.is_null() {
+        return Err(Error::argument("out and needed are both NULL"));
+    }
+    if !needed.is_null() {
+        // SAFETY: not NULL is valid.
+        unsafe { needed.write_unaligned(count) };
+    }
+    if !out.is_null() && capacity < count {
+        return Err(Error::new(
+            Status::Size,
+            format!("capacity {capacity} is below the {count} elements needed"),
+        ));
+    }
+    Ok(!out.is_null())
 }
 
 /// Copies text out, with a NUL at its end that counts.

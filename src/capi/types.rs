@@ -255,7 +255,7 @@ pub struct toile_step_report {
     pub advanced: f64,
     /// Largest force residual of a free vertex at the end [N].
     pub residual: f64,
-    /// Largest relative stretch of a mesh edge.
+    /// Largest relative stretch of a mesh edge, or of a piece of yarn between two nodes.
     pub max_edge_strain: f64,
     /// Smallest signed distance of a vertex to a body [m]; infinite without bodies.
     pub min_gap: f64,

@@ -3,10 +3,15 @@
 use super::desc;
 use super::guard::entry;
 use super::input::{self, LARGEST_COUNT};
-use super::output::{self, flat3};
+use super::output::{self, flat2, flat3};
 use super::sim::{SIMS, read, write};
 use super::status::toile_status;
 use super::types::{toile_sim, toile_yarn_changes};
+use crate::error::{Error, Result};
+use crate::math::Vec3;
+
+/// Most pieces of a curve between two nodes.
+const MOST_SAMPLES: u32 = 64;
 
 /// World positions of the yarns' nodes [m], shape [node_count, 3]; sizes as in toile_sim_positions.
 /// Empty in a garment of triangles alone.
@@ -156,6 +161,143 @@ pub unsafe extern "C" fn toile_sim_yarn_forces(
     entry!({
         read(sim, |sim| {
             output::copy(flat3(&sim.yarn_forces()?), out, capacity, needed)
+        })
+    })
+}
+
+/// Radius of each yarn [m], shape [yarn_count]. Sizes as in toile_sim_positions.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_yarn_radii(
+    sim: *const toile_sim,
+    out: *mut f64,
+    capacity: usize,
+    needed: *mut usize,
+) -> toile_status {
+    entry!({
+        read(sim, |sim| {
+            output::copy(&sim.yarn_radii(), out, capacity, needed)
+        })
+    })
+}
+
+/// Fabric of each yarn, counted as in the garment, shape [yarn_count]; rods along seams have the coarser of their two
+/// sides. Sizes as in toile_sim_positions.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_yarn_fabrics(
+    sim: *const toile_sim,
+    out: *mut u32,
+    capacity: usize,
+    needed: *mut usize,
+) -> toile_status {
+    entry!({
+        read(sim, |sim| {
+            let fabrics = sim.yarns().map_or(&[][..], |yarns| &yarns.yarn_fabric);
+            output::copy(fabrics, out, capacity, needed)
+        })
+    })
+}
+
+/// Panel in which each yarn was laid, shape [yarn_count]; rods along seams lie in one of the two. Sizes as in
+/// toile_sim_positions.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_yarn_panels(
+    sim: *const toile_sim,
+    out: *mut u32,
+    capacity: usize,
+    needed: *mut usize,
+) -> toile_status {
+    entry!({
+        read(sim, |sim| {
+            output::copy(&sim.yarn_panels(), out, capacity, needed)
+        })
+    })
+}
+
+/// Where each node was laid in its panel, flat coordinates [m], shape [node_count, 2]. Sizes as in
+/// toile_sim_positions.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_yarn_uv(
+    sim: *const toile_sim,
+    out: *mut f64,
+    capacity: usize,
+    needed: *mut usize,
+) -> toile_status {
+    entry!({
+        read(sim, |sim| {
+            let uv = sim.yarns().map_or(&[][..], |yarns| &yarns.uv);
+            output::copy(flat2(uv), out, capacity, needed)
+        })
+    })
+}
+
+/// Where the points of each yarn begin in toile_sim_yarn_curves of the same `samples`, shape [yarn_count + 1]; the last
+/// number is the number of points. It changes when the epoch of toile_sim_yarn_changes does. Sizes as in toile_sim_positions.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_yarn_curve_offsets(
+    sim: *const toile_sim,
+    samples: u32,
+    out: *mut u32,
+    capacity: usize,
+    needed: *mut usize,
+) -> toile_status {
+    entry!({
+        let samples = pieces(samples)?;
+        read(sim, |sim| {
+            output::copy(&sim.yarn_curve_offsets(samples)?, out, capacity, needed)
+        })
+    })
+}
+
+/// Yarns as they are drawn: points of smooth centre lines, `samples` pieces (1 to 64) between two nodes, which run beside each
+/// other where yarns cross [m], shape [point_count, 3], yarn after yarn; a tube of toile_sim_yarn_radii around each is the
+/// yarn. Sizes as in toile_sim_positions; asking for the number makes no points.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_yarn_curves(
+    sim: *const toile_sim,
+    samples: u32,
+    out: *mut f64,
+    capacity: usize,
+    needed: *mut usize,
+) -> toile_status {
+    entry!({
+        let samples = pieces(samples)?;
+        read(sim, |sim| {
+            let offsets = sim.yarn_curve_offsets(samples)?;
+            let count = 3 * offsets.last().copied().unwrap_or(0) as usize;
+            if !output::takes(count, out, capacity, needed)? {
+                return Ok(());
+            }
+            let curves = sim.yarn_curves(samples);
+            let points: Vec<Vec3> = curves.into_iter().flat_map(|c| c.points).collect();
+            output::copy(flat3(&points), out, capacity, needed)
+        })
+    })
+}
+
+fn pieces(samples: u32) -> Result<usize> {
+    if (1..=MOST_SAMPLES).contains(&samples) {
+        return Ok(samples as usize);
+    }
+    Err(Error::argument(format!(
+        "samples = {samples} must be from 1 to {MOST_SAMPLES}"
+    )))
+}
+
+/// Nodes of the border of a panel's yarns along one of its edges, rising: those on the edge, or with none before them
+/// where a piece lies away from it, as a pin with `edge` in a scene holds them. Empty where no yarns are simulated. Sizes as
+/// in toile_sim_positions. TOILE_E_ARGUMENT names a panel or an edge that does not exist.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn toile_sim_yarn_nodes_along(
+    sim: *const toile_sim,
+    panel: u32,
+    edge: u32,
+    out: *mut u32,
+    capacity: usize,
+    needed: *mut usize,
+) -> toile_status {
+    entry!({
+        read(sim, |sim| {
+            output::copy(&sim.yarn_nodes_along(panel, edge)?, out, capacity, needed)
         })
     })
 }

@@ -303,9 +303,13 @@ impl PeriodicCell {
             true
         })?;
         if done.end != End::Rest {
+            let why = match &done.end {
+                End::Stalled(reason) => reason,
+                _ => "all corrections allowed are taken",
+            };
             return Err(Error::material(format!(
-                "a periodic cell does not come to rest: {:?}, residual {:.1e} N after {} corrections, asked {force:.1e} N",
-                done.end, done.totals.residual, done.totals.substeps
+                "a periodic cell does not come to rest: {why}; residual {:.1e} N after {} corrections, asked {force:.1e} N",
+                done.totals.residual, done.totals.substeps
             )));
         }
         Ok(done.totals.newton_iterations)

@@ -235,15 +235,16 @@ impl Instance {
     /// use to a simulation that keeps its own.
     pub fn set_up(&mut self, tolerance: Option<f64>, start: f64, stop: Option<f64>) -> Answer {
         self.expect(&[Mode::Instantiated])?;
-        if tolerance.is_some_and(|t| !t.is_finite() || t < 0.0) {
+        if let Some(tolerance) = tolerance.filter(|t| !t.is_finite() || *t < 0.0) {
             return Err(Error::argument(format!(
-                "tolerance = {tolerance:?} must be finite and not negative"
+                "tolerance = {tolerance} must be finite and not negative"
             ))
             .into());
         }
         if !start.is_finite() || stop.is_some_and(|stop| !stop.is_finite() || stop <= start) {
+            let stop = stop.map_or("none".to_owned(), |stop| format!("{stop} s"));
             return Err(Error::argument(format!(
-                "start time {start} and stop time {stop:?} must be finite, the stop after the start"
+                "start time {start} s and stop time {stop} must be finite, the stop after the start"
             ))
             .into());
         }

@@ -59,9 +59,9 @@ impl Garment {
             "the garment's"
         };
         Err(Error::limit(format!(
-            "garment '{}': about {estimate:.3e} vertices, limit {max_vertices}; panel '{}' asks for about \
+            "{}: about {estimate:.3e} vertices, limit {max_vertices}; panel '{}' asks for about \
              {count:.3e} with {whose} edge length of {} m",
-            self.name,
+            self.title(),
             panel.name,
             scale * self.panel_edge_length(panel)
         )))
@@ -75,11 +75,11 @@ impl Garment {
     /// Everything in panels, seams, fabrics and blend regions that is impossible or inconsistent.
     pub fn problems(&self) -> Vec<Error> {
         if self.panels.is_empty() {
-            let text = format!("garment '{}' has no panels", self.name);
+            let text = format!("{} has no panels", self.title());
             return vec![Error::geometry(text)];
         }
         if self.fabrics.is_empty() {
-            let text = format!("garment '{}' has no fabrics", self.name);
+            let text = format!("{} has no fabrics", self.title());
             return vec![Error::material(text)];
         }
         let mut problems = Vec::new();
@@ -95,10 +95,7 @@ impl Garment {
                 ))),
             });
         }
-        keep(check_edge_length(
-            &format!("garment '{}'", self.name),
-            self.edge_length,
-        ));
+        keep(check_edge_length(&self.title(), self.edge_length));
         let mut names = BTreeMap::new();
         for (k, panel) in self.panels.iter().enumerate() {
             keep(match names.insert(panel.name.as_str(), k) {

@@ -42,6 +42,16 @@ pub struct Garment {
     pub blend_regions: Vec<BlendRegion>,
 }
 
+impl Garment {
+    /// Itself in messages: by name, if it has one.
+    pub fn title(&self) -> String {
+        match &*self.name {
+            "" => "the garment".into(),
+            name => format!("garment '{name}'"),
+        }
+    }
+}
+
 /// One flat piece of cloth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Panel {

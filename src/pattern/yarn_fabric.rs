@@ -177,7 +177,38 @@ impl Mask {
                 });
             }
         }
-        Ok(Self { width, over })
+        let mask = Self { width, over };
+        mask.check_interlaced()?;
+        Ok(mask)
+    }
+
+    /// Refuses a yarn that never changes sides: nothing holds it.
+    fn check_interlaced(&self) -> Result<()> {
+        let [width, height] = self.size();
+        let side = |front: bool| if front { "in front of" } else { "behind" };
+        for j in 0..height {
+            let first = self.warp_over(0, j);
+            if (1..width).all(|i| self.warp_over(i, j) == first) {
+                return Err(Error::parse(format!(
+                    "row {}: weft {} lies {} all warp yarns and is held by none",
+                    j + 1,
+                    j + 1,
+                    side(!first)
+                )));
+            }
+        }
+        for i in 0..width {
+            let first = self.warp_over(i, 0);
+            if (1..height).all(|j| self.warp_over(i, j) == first) {
+                return Err(Error::parse(format!(
+                    "column {}: warp {} lies {} all weft yarns and is held by none",
+                    i + 1,
+                    i + 1,
+                    side(first)
+                )));
+            }
+        }
+        Ok(())
     }
 
     /// Its name, or its lines.

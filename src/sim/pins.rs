@@ -5,13 +5,7 @@
 use super::{Sim, finite};
 use crate::error::{Error, Result};
 use crate::math::{Vec2, Vec3};
-use crate::pattern::outline::{point_distance, polylines};
 use crate::system::state::Pin;
-
-/// Turn of an edge between two points that nodes are measured from [rad].
-const TURN: f64 = 0.1;
-/// Distance to an edge of the panel, over the yarns' pitch, below which a node is on the edge.
-const BESIDE: f64 = 0.45;
 
 impl Sim {
     /// Holds vertices; targets are reached at the end of the next step, `None` holds them where
@@ -55,6 +49,23 @@ impl Sim {
             }
             for (p, t) in points.iter().zip(targets) {
                 finite(&format!("target of {}", self.name(*p)), t)?;
+            }
+            let mut order: Vec<usize> = (0..points.len()).collect();
+            order.sort_by_key(|k| points[*k]);
+            let differ =
+                |w: &&[usize]| points[w[0]] == points[w[1]] && targets[w[0]] != targets[w[1]];
+            if let Some(w) = order.windows(2).find(differ) {
+                let [a, b] = [targets[w[0]], targets[w[1]]];
+                return Err(Error::argument(format!(
+                    "{} has two targets: ({}, {}, {}) and ({}, {}, {}) m",
+                    self.name(points[w[0]]),
+                    a[0],
+                    a[1],
+                    a[2],
+                    b[0],
+                    b[1],
+                    b[2]
+                )));
             }
         }
         for (k, point) in points.iter().enumerate() {
@@ -248,28 +259,18 @@ impl Sim {
             .ok_or_else(|| Error::argument(format!("no yarns are simulated on panel {panel}")))
     }
 
-    /// Nodes that were laid on an edge of a panel, or nearer to it than to the next row of the fabric.
+    /// Nodes that are the border of a panel's yarns along one of its edges, as laid ([`crate::yarn::border`]); none where
+    /// no yarns are simulated there.
     pub fn yarn_nodes_along(&self, panel: u32, edge: u32) -> Result<Vec<u32>> {
         let shape = &self.garment.panels[self.panel(panel)?];
-        let pieces = polylines(&shape.segments()?, &shape.loops(), TURN);
-        let along: Vec<_> = pieces.iter().filter(|p| p.edge == edge as usize).collect();
-        if along.is_empty() {
-            return Err(Error::argument(format!("panel {panel} has no edge {edge}")));
+        let count = shape.edge_count();
+        if edge as usize >= count {
+            return Err(Error::argument(format!(
+                "panel {panel} has no edge {edge}: it has {count}"
+            )));
         }
-        let fabric = self.garment.fabrics[shape.fabric].yarns.as_ref();
-        let pitch = fabric.map_or(0.0, |f| {
-            let [a, b] = f.structure.pitch();
-            a.max(b)
-        });
-        let near = |uv: Vec2| {
-            let mut distances = along.iter().map(|p| point_distance(uv, p.a, p.b));
-            distances.any(|d| d < BESIDE * pitch)
-        };
-        Ok(self
-            .nodes_of(panel)
-            .filter(|n| near(n.1))
-            .map(|n| n.0)
-            .collect())
+        let part = self.yarns.as_ref();
+        Ok(part.map_or_else(Vec::new, |part| part.along(panel, edge)))
     }
 
     /// Nodes of a yarn, in its order.

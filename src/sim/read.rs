@@ -2,6 +2,7 @@
 
 use super::run::kinetic_energy;
 use super::{Energies, Sim};
+use crate::blend::Region;
 use crate::error::Result;
 use crate::math::Vec3;
 use crate::readout::surface;
@@ -178,6 +179,25 @@ impl Sim {
             .collect()
     }
 
+    /// What to tell of hybrid rings that join no vertex to yarns.
+    fn idle_rings(&self) -> Option<String> {
+        let wanted = self.garment.blend_regions.iter().find(|r| r.rings > 0)?;
+        let region = Region::new(&self.garment, &self.mesh).ok()?;
+        if !region.hybrid.contains(&true) {
+            return None;
+        }
+        let panel = &self.garment.panels[wanted.panel as usize];
+        let yarns = self.garment.fabrics[panel.fabric].yarns.as_ref()?;
+        let [a, b] = yarns.structure.pitch();
+        Some(format!(
+            "the {} hybrid rings of panel '{}' join no vertex to yarns, so the region is as without them: yarns are {a} \
+             and {b} m apart, the triangles' edges {} m long",
+            wanted.rings,
+            panel.name,
+            self.garment.panel_edge_length(panel)
+        ))
+    }
+
     /// What was built and what it costs.
     pub fn info(&self) -> SystemInfo {
         let engine = self.engine();
@@ -186,6 +206,10 @@ impl Sim {
         let filter = points.coupling.filter.as_ref();
         let rows = filter.map_or(0, |f| f.width());
         let moving = (0..points.count()).filter(|p| points.moves(*p)).count();
+        let mut notes = self.lowered_angles();
+        if filter.is_none_or(|f| f.kept().is_empty()) {
+            notes.extend(self.idle_rings());
+        }
         SystemInfo {
             vertices: self.mesh.uv.len(),
             triangles: self.mesh.triangles.len(),
@@ -205,7 +229,7 @@ impl Sim {
             bytes: engine.matrix_bytes() + system.bytes(),
             factor_bytes: engine.factor_bytes(),
             min_angle: self.mesh.min_angle,
-            notes: self.lowered_angles(),
+            notes,
             backend: engine.backend().to_owned(),
         }
     }

@@ -34,7 +34,9 @@ impl Sim {
                 "dt = {dt} s must be positive and at most 1e6"
             )));
         }
-        let saved = self.state.clone();
+        // the memory that hosts look at is kept for the state that a failure leaves
+        let now = self.state.clone();
+        let saved = std::mem::replace(&mut self.state, now);
         let mut engine = self.engine.lock().unwrap_or_else(PoisonError::into_inner);
         let mut watch = |fraction, residual| {
             progress(&Progress {
@@ -105,7 +107,8 @@ impl Sim {
                 self.settings.drape_max_steps as u64
             },
         };
-        let saved = self.state.clone();
+        let now = self.state.clone();
+        let saved = std::mem::replace(&mut self.state, now);
         let flat = *self.positions() == *self.mesh.placed;
         // a coarse sheet that nothing sews or carries finds folds that the fine one does not have
         let levels = if flat && !self.mesh.seams.is_empty() {

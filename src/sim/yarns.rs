@@ -14,6 +14,7 @@ use crate::solve::settings::Settings;
 use crate::system::state::State;
 use crate::system::yarn::friction::loose;
 use crate::tri::GarmentMesh;
+use crate::yarn::border::{Border, borders};
 use crate::yarn::layout::Layout;
 use crate::yarn::{Incidence, Names, Topology, YarnMaterial, YarnMesh, Yarns, lay};
 use std::sync::{Arc, PoisonError};
@@ -26,6 +27,8 @@ pub(super) struct YarnPart {
     pub(super) topology: Topology,
     /// What the laid nodes and passages are called.
     pub(super) names: Names,
+    /// Laid nodes that are the border of the yarns along edges of the panels, sorted.
+    borders: Vec<Border>,
     /// What joins them to the triangles.
     pub(super) coupling: Coupling,
     /// Triangles that the yarns stand for.
@@ -66,6 +69,7 @@ impl YarnPart {
         };
         let laid = lay(garment, &layout)?;
         let names = laid.names();
+        let borders = borders(garment, &laid)?;
         let materials: Vec<YarnMaterial> = garment
             .fabrics
             .iter()
@@ -90,6 +94,12 @@ impl YarnPart {
             masses,
         } = joined;
         yarns.check()?;
+        let mut number = vec![None; names.nodes.len()];
+        for (here, laid) in (0_u32..).zip(&nodes) {
+            number[*laid as usize] = Some(here);
+        }
+        let here = |b: Border| number[b.node as usize].map(|node| Border { node, ..b });
+        let borders = borders.into_iter().filter_map(here).collect();
         let mut follows = vec![false; mesh.uv.len()];
         for gone in [true, false] {
             let list = mesh.triangles.iter().zip(&left_out);
@@ -108,6 +118,7 @@ impl YarnPart {
             now: Arc::new(Yarns::laid(yarns, materials)),
             topology: Topology::default(),
             names: names.part(&nodes, &passages),
+            borders,
             coupling,
             left_out,
             share,
@@ -191,6 +202,23 @@ impl YarnPart {
         passed && !placed && !self.coupling.riders.rides(point)
     }
 
+    /// Nodes along an edge of a panel that yarns pass, those that came out of laid ones there among them.
+    pub(super) fn along(&self, panel: u32, edge: u32) -> Vec<u32> {
+        let mesh = &self.now.mesh;
+        let laid = mesh.uv.len() - self.now.split.len();
+        let origin = |n: u32| match (n as usize).checked_sub(laid) {
+            Some(split) => self.now.split[split],
+            None => n,
+        };
+        let borders = |node: u32| {
+            let border = Border { panel, edge, node };
+            self.borders.binary_search(&border).is_ok()
+        };
+        (0..mesh.uv.len() as u32)
+            .filter(|n| !mesh.stack(*n as usize).is_empty() && borders(origin(*n)))
+            .collect()
+    }
+
     /// Whether a vertex follows.
     pub(super) fn follows(&self, vertex: u32) -> bool {
         let bare = |f: &Arc<Filter>| f.bare().binary_search(&vertex).is_ok();
@@ -242,6 +270,39 @@ impl Sim {
                 }
             })
             .collect()
+    }
+
+    /// Where the points of each yarn begin in its curves of `samples` pieces to a segment, one after the other; the last is
+    /// their number.
+    pub fn yarn_curve_offsets(&self, samples: usize) -> Result<Vec<u32>> {
+        let mut offsets = vec![0];
+        let mut total = 0_usize;
+        for range in self.yarns().map_or(&[][..], |mesh| &mesh.starts).windows(2) {
+            total += (range[1] - range[0] - 1) as usize * samples + 1;
+            offsets.push(u32::try_from(total).map_err(|_| {
+                Error::limit(format!(
+                    "yarns of {samples} pieces to a segment have more than {} points",
+                    u32::MAX
+                ))
+            })?);
+        }
+        Ok(offsets)
+    }
+
+    /// Radius of each yarn [m].
+    pub fn yarn_radii(&self) -> Vec<f64> {
+        self.yarns.as_ref().map_or_else(Vec::new, |part| {
+            let yarns = 0..part.now.mesh.yarn_count();
+            yarns.map(|y| part.now.material(y).radius).collect()
+        })
+    }
+
+    /// Panel in which each yarn was laid.
+    pub fn yarn_panels(&self) -> Vec<u32> {
+        self.yarns().map_or_else(Vec::new, |mesh| {
+            let yarns = 0..mesh.yarn_count();
+            yarns.map(|y| mesh.panel_of(y) as u32).collect()
+        })
     }
 
     /// Smooth centre lines of the yarns, `samples` pieces to a segment.

@@ -76,8 +76,8 @@ pub fn edge_fractions(
     let total: usize = fractions.iter().flatten().map(|cut| cut.len() - 1).sum();
     if total > max_vertices {
         return Err(Error::limit(format!(
-            "garment '{}': {total} boundary vertices, limit {max_vertices}",
-            garment.name
+            "{}: {total} boundary vertices, limit {max_vertices}",
+            garment.title()
         )));
     }
     Ok(fractions)

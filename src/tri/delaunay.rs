@@ -122,8 +122,8 @@ fn join(
     let total: usize = meshes.iter().map(|m| m.uv.len()).sum();
     if total > max_vertices {
         return Err(Error::limit(format!(
-            "garment '{}': {total} vertices, limit {max_vertices}",
-            garment.name
+            "{}: {total} vertices, limit {max_vertices}",
+            garment.title()
         )));
     }
     let mut mesh = GarmentMesh {

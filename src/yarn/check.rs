@@ -1,7 +1,7 @@
 //! Refuses yarn meshes that contradict themselves or their garment.
 
 use super::region::Region;
-use super::{Family, YarnMesh};
+use super::{Family, Wrap, YarnMesh};
 use crate::error::{Error, Result};
 use crate::pattern::Garment;
 
@@ -130,7 +130,7 @@ impl YarnMesh {
                 }
             }
             if let Some(bad) = yarn.iter().find(|i| i.node as usize >= self.uv.len()) {
-                return refuse(format!("yarn {y}: node {} of {}", bad.node, self.uv.len()));
+                return refuse(format!("yarn {y} passes {}", self.node_text(bad.node)));
             }
         }
         Ok(())
@@ -142,17 +142,24 @@ impl YarnMesh {
             let stack = self.stack(node);
             for strand in stack {
                 let Some(incidence) = self.incidences.get(strand.incidence as usize) else {
-                    return refuse(format!("node {node}: incidence {}", strand.incidence));
+                    return refuse(format!(
+                        "{}: {} in its stack",
+                        self.node_text(node as u32),
+                        self.passage_text(strand.incidence)
+                    ));
                 };
                 if incidence.node as usize != node || seen[strand.incidence as usize] {
                     return refuse(format!(
-                        "incidence {} stands in the stack of node {node} and belongs to another, or twice",
-                        strand.incidence
+                        "{} stands in the stack of node {node}, or twice in its own",
+                        self.passage_text(strand.incidence)
                     ));
                 }
                 seen[strand.incidence as usize] = true;
                 if stack.len() == 1 && incidence.slides {
-                    return refuse(format!("node {node}: its only yarn slides"));
+                    return refuse(format!(
+                        "{}: no other yarn passes there, and it slides",
+                        self.passage_text(strand.incidence)
+                    ));
                 }
             }
             // the crossing yarn lies before or behind all strands of the other group
@@ -163,7 +170,8 @@ impl YarnMesh {
             let beside = stack.len() > 1 && changes == 0;
             if changes > 1 || (beside && self.is_inside(node as u32)) {
                 return refuse(format!(
-                    "node {node}: {} strands in {} groups",
+                    "{}: the {} yarns through it must cross, all of one beside each other; from back to front they make {} groups",
+                    self.node_text(node as u32),
                     stack.len(),
                     changes + 1
                 ));
@@ -194,11 +202,11 @@ impl YarnMesh {
             })
     }
 
-    /// The strand that runs from a wing's end through the nodes `near` and `far`: which way along
-    /// the yarn, and its incidence at `near`.
-    pub(super) fn strand(&self, wing: u32, near: u32, far: u32) -> Option<(i32, u32)> {
+    /// The strands that run from a wing's end through the nodes `near` and `far`: which way along
+    /// the yarn, and its incidence at `near`. A yarn that turns at the wing has two.
+    fn strands(&self, wing: u32, near: u32, far: u32) -> impl Iterator<Item = (i32, u32)> + '_ {
         let node = |i: u32| self.incidences[i as usize].node;
-        [-1, 1].into_iter().find_map(|step| {
+        [-1, 1].into_iter().filter_map(move |step| {
             let at = wing.checked_add_signed(step)?;
             let beyond = at.checked_add_signed(step)?;
             let runs = self.neighbours(wing, at) && self.neighbours(at, beyond);
@@ -206,16 +214,63 @@ impl YarnMesh {
         })
     }
 
+    /// The two strands of a wrap, apart from each other: each runs from its wing through both nodes of the axis.
+    pub(super) fn wrapped(&self, wrap: &Wrap) -> Option<[(i32, u32); 2]> {
+        let [q0, q1] = wrap.axis;
+        self.strands(wrap.wings[0], q0, q1).find_map(|a| {
+            let mut others = self.strands(wrap.wings[1], q1, q0);
+            let apart = |b: &(i32, u32)| a.1 != b.1 && !self.neighbours(a.1, b.1);
+            others.find(apart).map(|b| [a, b])
+        })
+    }
+
+    /// A node and where it was laid, for people.
+    fn node_text(&self, node: u32) -> String {
+        match (
+            self.uv.get(node as usize),
+            self.node_panel.get(node as usize),
+        ) {
+            (Some(uv), Some(panel)) => {
+                format!("node {node} at ({}, {}) m of panel {panel}", uv.x, uv.y)
+            }
+            _ => format!("node {node} of {}", self.uv.len()),
+        }
+    }
+
+    /// A passage, its yarn and its node, for people.
+    fn passage_text(&self, i: u32) -> String {
+        let Some(incidence) = self.incidences.get(i as usize) else {
+            return format!("passage {i} of {}", self.incidences.len());
+        };
+        let yarn = self.starts.partition_point(|s| *s <= i) - 1;
+        let number = i - self.starts[yarn];
+        let node = self.node_text(incidence.node);
+        format!("yarn {yarn}, passage {number} through {node}")
+    }
+
+    fn passages_text(&self, [a, b]: [u32; 2]) -> String {
+        format!("{} and {}", self.passage_text(a), self.passage_text(b))
+    }
+
+    fn nodes_text(&self, nodes: &[u32]) -> String {
+        let all: Vec<String> = nodes.iter().map(|n| self.node_text(*n)).collect();
+        all.join(", ")
+    }
+
     fn check_contacts(&self) -> Result<()> {
         let length =
             |[a, b]: [u32; 2]| self.incidences[b as usize].u - self.incidences[a as usize].u;
-        for (k, spring) in self.stitch_springs.iter().enumerate() {
+        for spring in &self.stitch_springs {
             let [a, b] = spring.incidences;
             if a >= b || !self.neighbours(a, b) || !near(length([a, b]), spring.length) {
-                return refuse(format!("stitch spring {k}: {spring:?}"));
+                return refuse(format!(
+                    "the yarn inside of a stitch, between {}, must be {} m of one yarn without another passage",
+                    self.passages_text([a, b]),
+                    spring.length
+                ));
             }
         }
-        for (k, spacing) in self.spacings.iter().enumerate() {
+        for spacing in &self.spacings {
             let [a, b] = spacing.incidences;
             let good = a < b
                 && self.neighbours(a, b)
@@ -223,35 +278,42 @@ impl YarnMesh {
                 && spacing.least > 0.0
                 && spacing.least < spacing.length;
             if !good {
-                return refuse(format!("spacing {k}: {spacing:?}"));
+                return refuse(format!(
+                    "neighbouring contacts, {}, must be {} m apart along one yarn and be kept apart by less, are by {} m",
+                    self.passages_text([a, b]),
+                    spacing.length,
+                    spacing.least
+                ));
             }
         }
-        for (k, wrap) in self.wraps.iter().enumerate() {
+        for wrap in &self.wraps {
             let [q0, q1] = wrap.axis;
-            // a wing's strand runs through both nodes of the axis and on to the wing
-            let (a, b) = (
-                self.strand(wrap.wings[0], q0, q1).map(|s| s.1),
-                self.strand(wrap.wings[1], q1, q0).map(|s| s.1),
-            );
-            let apart = match (a, b) {
-                (Some(a), Some(b)) => a != b && !self.neighbours(a, b),
-                _ => false,
-            };
-            if q0 == q1 || !apart || !(wrap.length > 0.0) || wrap.sign.abs() != 1.0 {
-                return refuse(format!("wrap {k}: {wrap:?}"));
+            let numbers = wrap.length > 0.0 && wrap.sign.abs() == 1.0;
+            if q0 == q1 || !numbers || self.wrapped(wrap).is_none() {
+                return refuse(format!(
+                    "two yarns turn around each other between {}: they must run through both nodes to {}; length {} m, sign {}",
+                    self.nodes_text(&wrap.axis),
+                    self.passages_text(wrap.wings),
+                    wrap.length,
+                    wrap.sign
+                ));
             }
         }
         Ok(())
     }
 
     fn check_crossings(&self) -> Result<()> {
-        for (k, corner) in self.corners.iter().enumerate() {
+        for corner in &self.corners {
             let [q, a, b] = corner.nodes;
             if a == b || !self.beside(q, a) || !self.beside(q, b) || !(corner.length > 0.0) {
-                return refuse(format!("corner {k}: {corner:?}"));
+                return refuse(format!(
+                    "the angle of a crossing, {}: yarns must go from the first to the other two, which differ; pitch {} m",
+                    self.nodes_text(&corner.nodes),
+                    corner.length
+                ));
             }
         }
-        for (k, tie) in self.ties.iter().enumerate() {
+        for tie in &self.ties {
             let nodes = self.uv.len() as u32;
             let [a, b] = tie.segment;
             let good = tie.node < nodes
@@ -262,7 +324,13 @@ impl YarnMesh {
                 && (0.0..=1.0).contains(&tie.t)
                 && tie.length >= 0.0;
             if !good {
-                return refuse(format!("tie {k}: {tie:?}"));
+                return refuse(format!(
+                    "{} is tied to a seam's rod between {}: the two must be neighbours and others than it, the fraction {} between 0 and 1, the length {} m not negative",
+                    self.node_text(tie.node),
+                    self.nodes_text(&tie.segment),
+                    tie.t,
+                    tie.length
+                ));
             }
             let stack = [self.stack(a as usize), self.stack(b as usize)];
             let rod = match (stack[0], stack[1]) {
@@ -281,7 +349,9 @@ impl YarnMesh {
                 .all(|s| !self.incidences[s.incidence as usize].slides);
             if !seam || !frozen {
                 return refuse(format!(
-                    "tie {k}: {tie:?} must freeze its node at a seam's rod"
+                    "{} is tied between {}: that must be a seam's rod, and no yarn may slide at the tied node",
+                    self.node_text(tie.node),
+                    self.nodes_text(&tie.segment)
                 ));
             }
         }

@@ -5,6 +5,7 @@
 //! through it, the yarn's material coordinate `u` there, its arc length at rest. A yarn is the
 //! ordered list of its incidences. Everything here is rest data; what moves is in the State.
 
+pub mod border;
 mod builder;
 mod check;
 mod cut;

@@ -112,7 +112,7 @@ impl Piece {
         let width = repeat.iter().map(|row| makes(row)).fold(takes, usize::max);
         if width > wales {
             return Err(Error::geometry(format!(
-                "the repeat of {width} loops does not fit into the panel's {wales}"
+                "the repeat of {width} loops does not fit into the panel, which holds {wales} loops across"
             )));
         }
         let (count, plain) = (wales / width, wales % width);
@@ -141,7 +141,7 @@ impl Piece {
         let widest = rows.iter().map(|row| makes(row)).fold(cast_on, usize::max);
         if widest > wales || needed > courses {
             return Err(Error::geometry(format!(
-                "the chart of {widest} loops and {needed} rows is used once and does not fit into the panel's {wales} and {courses}"
+                "the chart of {widest} loops and {needed} rows is used once and does not fit into the panel, which holds {wales} loops across and {courses} rows"
             )));
         }
         if bound {

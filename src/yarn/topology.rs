@@ -113,7 +113,8 @@ fn present(laid: &YarnMesh, topology: &Topology) -> Result<(YarnMesh, Vec<u32>)>
         let known = (*passage as usize) < count && last.is_none_or(|l| l < *passage);
         let there = place.is_none_or(|n| (n as usize) < nodes + topology.split.len());
         if !known || !there {
-            return bad(format!("passage {passage} at node {place:?}"));
+            let at = place.map_or("none".to_owned(), |n| n.to_string());
+            return bad(format!("passage {passage} of {count} at node {at}"));
         }
         node[*passage as usize] = place.unwrap_or(GONE);
         last = Some(*passage);
@@ -242,23 +243,25 @@ fn contacts(mesh: &mut YarnMesh, map: &Map<'_>) {
 /// The wings of a wrap whose contact is whole: each yarn goes on from there to the next passage that
 /// there is.
 fn wings(mesh: &YarnMesh, map: &Map<'_>, wrap: &Wrap) -> Option<[u32; 2]> {
+    let strands = map.laid.wrapped(wrap)?;
     let mut out = [0; 2];
-    let mut near = [0; 2];
-    for k in 0..2 {
-        let (wing, at, beyond) = (wrap.wings[k], wrap.axis[k], wrap.axis[1 - k]);
-        let (step, from) = map.laid.strand(wing, at, beyond)?;
+    for (out, (step, from)) in out.iter_mut().zip(strands) {
         let far = from.checked_add_signed(step)?;
         if !(map.stays(from) && map.stays(far)) {
             return None;
         }
-        near[k] = map.here(from)?;
-        let next = near[k].checked_add_signed(-step)?;
-        if !mesh.neighbours(near[k], next) {
+        let near = map.here(from)?;
+        *out = near.checked_add_signed(-step)?;
+        if !mesh.neighbours(near, *out) {
             return None;
         }
-        out[k] = next;
     }
-    let apart = near[0] != near[1] && !mesh.neighbours(near[0], near[1]);
     let aside = out.map(|i| mesh.incidences[i as usize].node);
-    (apart && !aside.iter().any(|n| wrap.axis.contains(n))).then_some(out)
+    let apart = aside.iter().all(|n| !wrap.axis.contains(n)) && out[0] != out[1];
+    // where passages have gone the two may have become one strand
+    let now = Wrap {
+        wings: out,
+        ..*wrap
+    };
+    (apart && mesh.wrapped(&now).is_some()).then_some(out)
 }

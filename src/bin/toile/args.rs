@@ -8,7 +8,8 @@ use std::path::PathBuf;
 #[command(
     version,
     after_help = "Exit codes: 0 done; 1 scene refused or problems found; 2 wrong command line; \
-                  3 no admissible state found; 4 a result could not be written."
+                  3 no admissible state found; 4 a result could not be written; \
+                  5 a drape did not come to rest (results are written, outcome says why)."
 )]
 pub(crate) struct Cli {
     #[command(subcommand)]

@@ -2,7 +2,7 @@
 //!
 //! Exit codes: 0 done; 1 the scene or a file of it was refused (or `check` found problems); 2 the
 //! command line was wrong; 3 the simulation found no admissible state; 4 a result could not be
-//! written. A drape that stops at its iteration limit ends with 0 and says so in `outcome`.
+//! written; 5 a drape of `run` stopped at its iteration limit, stalled or fell: results are written, and `outcome` says which.
 
 mod args;
 mod fabric;

@@ -21,6 +21,9 @@ use toile::system::contact::crossing::SewnSurface;
 /// Time of `--verify` [s] and its step [s].
 const VERIFY: (u32, f64) = (60, 1.0 / 60.0);
 
+/// Exit code of a drape that does not come to rest.
+const NOT_AT_REST: u8 = 5;
+
 /// Frames kept for the model file and the point cache.
 #[derive(Default)]
 struct Frames {
@@ -129,7 +132,7 @@ pub(crate) fn run(args: &RunArgs) -> Done {
     if !args.quiet {
         out(&table(&scene, &json, &args.out))?;
     }
-    Ok(ExitCode::SUCCESS)
+    Ok(summary.exit_code())
 }
 
 /// A bar on the terminal; nothing where there is none.
@@ -246,6 +249,16 @@ fn write(
 }
 
 impl Summary {
+    /// Whether it came to rest where it was asked to.
+    fn exit_code(&self) -> ExitCode {
+        match self.outcome {
+            Some(Outcome::IterationLimit | Outcome::Stalled | Outcome::Falling) => {
+                ExitCode::from(NOT_AT_REST)
+            }
+            _ => ExitCode::SUCCESS,
+        }
+    }
+
     /// Adds the counts of a drape or a step and keeps the outcome that matters most: a limit that was
     /// hit outweighs substeps.
     fn take(&mut self, report: &StepReport) {

@@ -27,6 +27,8 @@ pub(crate) struct Summary {
 
 /// Gap of a seam that is no longer sewn [m].
 const OPEN_SEAM: f64 = 2e-3;
+/// Relative stretch that no yarn or cloth survives.
+const TORN: f64 = 1.0;
 
 impl Summary {
     pub(crate) fn new(scene: &Scene) -> Self {
@@ -57,6 +59,13 @@ impl Summary {
                 "a seam is open by {:.1} mm: the garment is not sewn shut, as where it is too tight or \
                  placed for a body that stands elsewhere (--body-offset moves the body)",
                 1e3 * last.max_seam_gap
+            ));
+        }
+        if last.max_edge_strain > TORN {
+            doubts.push(format!(
+                "an edge of triangles or a piece of yarn is {:.1} times as long as at rest: nothing tears here, and what it \
+                 pulls with means nothing",
+                1.0 + last.max_edge_strain
             ));
         }
         for (count, what) in [
@@ -148,6 +157,8 @@ pub(crate) fn table(scene: &Scene, json: &Value, dir: &Path) -> String {
         ("reason", "reason"),
         ("vertices", "vertices"),
         ("triangles", "triangles"),
+        ("yarns", "yarns"),
+        ("yarn nodes", "yarn_nodes"),
         ("steps", "steps"),
         ("Newton iterations", "newton_iterations"),
         ("edges through a body", "body_crossings"),

@@ -15,8 +15,8 @@ pub(crate) fn yarns(args: &SceneArgs, svg: &Path) -> Done {
     let garment = load(args)?.garment;
     if garment.fabrics.iter().all(|fabric| fabric.yarns.is_none()) {
         return Err(Failure::from(Error::material(format!(
-            "garment '{}': no fabric has yarns",
-            garment.name
+            "{}: no fabric has yarns",
+            garment.title()
         ))));
     }
     let cells = cells(&garment, |_| true, &Settings::default())?;

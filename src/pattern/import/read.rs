@@ -4,6 +4,7 @@
 use super::schema::Key;
 use crate::error::{Error, Result};
 use crate::math::{Vec2, Vec3};
+use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Value};
 
 /// Longest JSON text accepted [bytes].
@@ -14,7 +15,7 @@ pub fn keep<T>(problems: &mut Vec<Error>, result: Result<T>) -> Option<T> {
     result.map_err(|e| problems.push(e)).ok()
 }
 
-/// Parses JSON text; nesting above 128 levels, numbers beyond f64 and bad syntax are refused.
+/// Parses JSON text; nesting above 128 levels, numbers beyond f64, keys given twice and bad syntax are refused.
 pub fn parse(text: &str) -> Result<Value> {
     if text.len() > MAX_TEXT {
         return Err(Error::limit(format!(
@@ -22,7 +23,77 @@ pub fn parse(text: &str) -> Result<Value> {
             text.len()
         )));
     }
-    serde_json::from_str(text).map_err(|e| Error::parse(format!("not valid JSON: {e}")))
+    let strict: Strict =
+        serde_json::from_str(text).map_err(|e| Error::parse(format!("not valid JSON: {e}")))?;
+    Ok(strict.0)
+}
+
+/// A value without keys given twice, of which all but one would be lost.
+struct Strict(Value);
+
+impl<'de> Deserialize<'de> for Strict {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> std::result::Result<Self, D::Error> {
+        from.deserialize_any(StrictVisitor).map(Self)
+    }
+}
+
+struct StrictVisitor;
+
+impl<'de> Visitor<'de> for StrictVisitor {
+    type Value = Value;
+
+    fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("a JSON value")
+    }
+
+    fn visit_unit<E>(self) -> std::result::Result<Value, E> {
+        Ok(Value::Null)
+    }
+
+    fn visit_bool<E>(self, value: bool) -> std::result::Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_i64<E>(self, value: i64) -> std::result::Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_u64<E>(self, value: u64) -> std::result::Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_f64<E>(self, value: f64) -> std::result::Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_str<E>(self, value: &str) -> std::result::Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_string<E>(self, value: String) -> std::result::Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut from: A) -> std::result::Result<Value, A::Error> {
+        let mut items = Vec::new();
+        while let Some(Strict(item)) = from.next_element()? {
+            items.push(item);
+        }
+        Ok(items.into())
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut from: A) -> std::result::Result<Value, A::Error> {
+        let mut map = Map::new();
+        while let Some(key) = from.next_key::<String>()? {
+            if map.contains_key(&key) {
+                let text = format!("key '{}' is given twice", shown(&key));
+                return Err(serde::de::Error::custom(text));
+            }
+            let Strict(value) = from.next_value()?;
+            map.insert(key, value);
+        }
+        Ok(map.into())
+    }
 }
 
 /// A JSON value and where it stands.
@@ -241,5 +312,26 @@ impl<'a> Object<'a> {
     /// Whether the key is there at all.
     pub fn has(&self, key: &str) -> bool {
         self.map.contains_key(key)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_those_of_the_text_and_keys_stand_once() {
+        let text =
+            r#"{"b": [1, -2, 0.1, 1e-7, true, null, "x"], "a": {"k": 18446744073709551615}}"#;
+        let strict = parse(text).unwrap();
+        assert_eq!(strict, serde_json::from_str::<Value>(text).unwrap());
+        assert_eq!(
+            strict.to_string(),
+            text.replace(", ", ",").replace(": ", ":")
+        );
+        let error = parse("{\"a\": [{\"k\": 1,\n \"k\": 2}]}")
+            .unwrap_err()
+            .message;
+        assert!(error.contains("'k' is given twice at line 2"), "{error}");
     }
 }

@@ -11,7 +11,7 @@
 //!
 //! An end and a loop come off only if the yarn that goes on from there is under a tension above `k_b/(8 R^2)`: the
 //! bending energy per length of a yarn that lies around another one, which has to be bent straight to come out.
-//! Cloth does not fray by its own weight. Where inertia has carried them to a fifth of the radius they come off
+//! Cloth that is held well does not fray by its own weight. Where inertia has carried them to a fifth of the radius they come off
 //! at once.
 //!
 //! Where several yarns of one group are left at a node, each gets its own. Material coordinates of ends and of nodes

@@ -198,7 +198,15 @@ pub(super) fn read_sim(world: &World, choices: &mut Choices<'_>) -> toile_status
     let body = choices.index();
     let point = choices.numbers(3);
     let status = unsafe {
-        match choices.below(26) {
+        match choices.below(31) {
+            26 => toile_sim_yarn_curves(sim, choices.index(), out, capacity, needed),
+            27 => toile_sim_yarn_curve_offsets(sim, choices.index(), out.cast(), capacity, needed),
+            28 => toile_sim_yarn_uv(sim, out, capacity, needed),
+            29 => toile_sim_yarn_radii(sim, out, capacity, needed),
+            30 => {
+                let edge = choices.index();
+                toile_sim_yarn_nodes_along(sim, body, edge, out.cast(), capacity, needed)
+            }
             24 => toile_sim_vertex_errors(sim, out, capacity, needed),
             25 => {
                 let mut wish = filled(toile_suggest_desc_init);
