@@ -56,6 +56,7 @@ bench-yarn: all
 bench-mixed: all
 	$(CARGO) bench --bench mixed
 	$(CARGO) bench --bench rings
+	$(CARGO) bench --bench waves
 
 fuzz:
 	@bash scripts/fuzz.sh $(FUZZ_SECONDS)

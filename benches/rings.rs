@@ -1,8 +1,8 @@
 //! Linear solvers under the constraints of blended rings: preconditioner x ratio of triangles to yarns x step.
 //!
-//! The system of `tests/ring_cases`, with yarns that slide through all their contacts or nowhere. Iterations until all positions err
+//! The system of `tests/ring_cases`, with yarns that slide nowhere, through all their contacts, or that and on a plane. Iterations until all positions err
 //! by 1e-3, 1e-6 and 1e-8 against the direct solution, root mean squares. `cargo bench --bench rings`, or
-//! `make bench-mixed`; `--quick` leaves out the larger square.
+//! `make bench-mixed`; `--ratio 5` or `--ratio 20` takes one square.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -12,7 +12,7 @@
 #[path = "../tests/ring_cases/mod.rs"]
 mod ring_cases;
 
-use ring_cases::{Case, case};
+use ring_cases::{Case, Yarning, case};
 use std::time::Instant;
 use toile::math::Vec3;
 use toile::math::parallel::Workers;
@@ -32,21 +32,18 @@ fn main() {
     println!(
         "iterations to errors of 1e-3, 1e-6, 1e-8 of all positions, seconds to prepare and for the last; - beyond {CAP}"
     );
-    let quick = std::env::args().any(|a| a == "--quick");
-    let scenes = [
-        (0.1, 5.0, [0.0285, 0.0715], false),
-        (0.1, 5.0, [0.0285, 0.0715], true),
-        (0.2, 20.0, [0.056, 0.144], false),
-        (0.2, 20.0, [0.056, 0.144], true),
+    let only = std::env::args().skip_while(|a| a != "--ratio").nth(1);
+    let squares = [
+        (0.1, 5.0, [0.0285, 0.0715], &[1e-4, 1e-3, 1e-2][..]),
+        (0.2, 20.0, [0.056, 0.144], &[1e-3, 1e-2]),
     ];
-    let count = if quick { 2 } else { scenes.len() };
-    for (side, ratio, range, sliding) in &scenes[..count] {
-        for h in if *ratio < 10.0 {
-            &[1e-4, 1e-3, 1e-2][..]
-        } else {
-            &[1e-3, 1e-2]
-        } {
-            let case = case(*side, *ratio, *range, *h, *sliding);
+    for (side, ratio, range, steps) in squares {
+        if only.as_ref().is_some_and(|o| *o != ratio.to_string()) {
+            continue;
+        }
+        let all = [Yarning::Tied, Yarning::Slides, Yarning::SlidesAndTouches];
+        for (yarning, h) in (all.into_iter()).flat_map(|y| steps.iter().map(move |h| (y, h))) {
+            let case = case(side, ratio, range, *h, yarning);
             let workers = Workers::new(1);
             let n = case.matrix.n();
             let mut expected = vec![Vec3::zeros(); n];
@@ -64,14 +61,13 @@ fn main() {
                 .solve(&case.matrix, &case.right, &mut expected, 0.0)
                 .expect("solution");
             println!(
-                "ratio {ratio}, step {} ms, {}: {} blocks, {} in rings, {} vertices there; direct {:.3} s, {first:.3} s with the analysis",
+                "ratio {ratio}, step {} ms, {}: {n} blocks, {} touch, {} in rings, {} vertices there; direct {:.3} s, {first:.3} s with the analysis",
                 1e3 * h,
-                if *sliding {
-                    "yarns slide"
-                } else {
-                    "yarns do not slide"
+                match yarning {
+                    Yarning::Tied => "yarns do not slide",
+                    Yarning::Slides | Yarning::SlidesAndTouches => "yarns slide",
                 },
-                n,
+                case.touching,
                 case.filter.nodes().len(),
                 case.filter.kept().len(),
                 start.elapsed().as_secs_f64()

@@ -1,8 +1,9 @@
 //! The one Rust facade: a garment in a world, stepped, draped, edited, saved, restored.
 //!
 //! Here: making, saving and restoring a [`Sim`]. `run` lets time pass, `world` edits what is around
-//! the cloth, `pins` holds it, `region` moves regions of yarns, `read` tells what there is.
+//! the cloth, `pins` holds it, `region` moves regions of yarns and `hold` the pins with them, `read` tells what there is.
 
+mod hold;
 mod pins;
 mod read;
 mod region;

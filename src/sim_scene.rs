@@ -7,7 +7,7 @@
 use crate::body::Pose;
 use crate::error::{Error, Result};
 use crate::scene::{PinPlace, Scene, motion};
-use crate::sim::{Sim, SimOptions};
+use crate::sim::{Sim, SimOptions, StepReport};
 use std::path::Path;
 
 /// Reads a scene and builds its simulation.
@@ -92,6 +92,11 @@ pub fn pinned_points(sim: &Sim, scene: &Scene) -> Result<Vec<Vec<u32>>> {
 
 /// Points at a place of a panel: one, or those of an edge or of a yarn in rising order without repetition.
 fn place(sim: &Sim, panel: u32, place: PinPlace) -> Result<Vec<u32>> {
+    if let (PinPlace::Yarn { yarn, .. }, None) = (place, sim.yarns()) {
+        return Err(Error::argument(format!(
+            "yarn {yarn} is held, and no yarns are simulated: triangles alone have none to hold or to pull"
+        )));
+    }
     let nodes = match place {
         PinPlace::Point(uv) => {
             let vertex = sim.locate(panel, uv)?;
@@ -179,6 +184,27 @@ impl Driver {
                 .map(|pin| pin.until.is_none_or(|until| sim.time() <= until))
                 .collect(),
         })
+    }
+
+    /// Takes step `step`, from 1, of the scene's run, which began when the simulation was at `origin` [s].
+    pub fn step(
+        &mut self,
+        sim: &mut Sim,
+        scene: &Scene,
+        origin: f64,
+        step: u64,
+    ) -> Result<StepReport> {
+        let (time, steps) = (scene.run.time_after(step), scene.run.steps());
+        self.set(sim, scene, origin + time)?;
+        // a last step of what is left of the duration
+        let whole = step < steps || time == step as f64 * scene.run.dt;
+        let dt = if whole {
+            scene.run.dt
+        } else {
+            time - scene.run.time_after(step - 1)
+        };
+        sim.step(dt)
+            .map_err(|e| e.at(format!("step {step} of {steps}")))
     }
 
     /// Says where everything is at `time` [s], the end of the next step.

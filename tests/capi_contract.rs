@@ -84,6 +84,7 @@ fn with_sim(sim: *mut toile_sim) -> Vec<(&'static str, toile_status)> {
         toile_sim_yarn_changes(&mut changes),
         toile_sim_suggest_region(&wish, ptr::null_mut(), 0, n, ptr::null_mut()),
         toile_sim_vertex_errors(ptr::null_mut(), 0, n),
+        toile_sim_vertex_criteria(ptr::null_mut(), 0, n),
         toile_sim_locate_yarn_node(0, zero.as_ptr(), &mut count),
         toile_sim_yarn_end(0, 0, &mut count),
         toile_sim_body_positions(0, ptr::null_mut(), 0, n),

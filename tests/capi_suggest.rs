@@ -61,14 +61,27 @@ fn a_suggested_region_is_one_that_a_garment_takes() {
     }
     let errors: Vec<f64> = array(|o, c, k| unsafe { toile_sim_vertex_errors(sim.0, o, c, k) });
     assert_eq!(errors.len(), alpha.len());
+    let criteria: Vec<f64> = array(|o, c, k| unsafe { toile_sim_vertex_criteria(sim.0, o, c, k) });
+    let of_each = criteria.chunks(TOILE_CRITERION_COUNT as usize);
+    assert_eq!(of_each.len(), errors.len());
+    for (error, criteria) in errors.iter().zip(of_each) {
+        let sum: f64 = criteria.iter().map(|c| c * c).sum();
+        assert!((error - sum.sqrt()).abs() < 1e-12);
+    }
+    // waves across no seam: that criterion alone wants nothing
+    let mut seam = desc;
+    seam.left_out = (1 << TOILE_CRITERION_COUNT) - 1 - (1 << TOILE_CRITERION_SEAM);
+    assert!(self::alpha(&sim, &seam).iter().all(|a| *a == 0.0));
     let count = alpha.len();
     ok(unsafe { toile_garment_set_blend_vertices(garment.0, alpha.as_ptr(), count, 0) });
     let mixed = Sim::new(&garment);
     let mut info = filled(toile_system_info_init);
     ok(unsafe { toile_sim_info(mixed.0, &mut info) });
     assert_eq!(info.active_triangles, out.active_triangles);
-    let ratio = info.yarn_nodes as f64 / out.yarn_nodes as f64;
-    assert!((0.95..1.05).contains(&ratio), "{ratio}");
+    assert_eq!(
+        (info.yarn_nodes, info.carried_nodes, info.unknowns),
+        (out.yarn_nodes, out.carried_nodes, out.unknowns)
+    );
     // the simulation that was asked takes it as it lives
     let x = sim.positions();
     ok(unsafe { toile_sim_set_blend_vertices(sim.0, alpha.as_ptr(), count, 0) });
@@ -89,6 +102,7 @@ fn a_suggested_region_is_one_that_a_garment_takes() {
     // the mixed one is not asked again
     let status = unsafe { toile_sim_suggest_region(mixed.0, &desc, none, 0, unasked, none.cast()) };
     fails(status, TOILE_E_UNSUPPORTED);
+    assert!(last_error().contains("without blend regions"));
     let status = unsafe { toile_sim_vertex_errors(mixed.0, none, 0, unasked) };
     fails(status, TOILE_E_UNSUPPORTED);
     // zero everywhere takes the regions away
@@ -120,7 +134,9 @@ fn wishes_and_alphas_that_cannot_be_are_refused() {
         fails(ask(&with(&|d| d.tolerance = bad)), TOILE_E_ARGUMENT);
     }
     fails(ask(&with(&|d| d.rings = 4)), TOILE_E_ARGUMENT);
-    fails(ask(&with(&|d| d.reserved = 1)), TOILE_E_ARGUMENT);
+    for left_out in [1 << TOILE_CRITERION_COUNT, (1 << TOILE_CRITERION_COUNT) - 1] {
+        fails(ask(&with(&|d| d.left_out = left_out)), TOILE_E_ARGUMENT);
+    }
     fails(ask(&with(&|d| d.struct_size = 3)), TOILE_E_SIZE);
     // an older host's description ends after the tolerance
     ok(ask(&with(&|d| d.struct_size = 16)));
@@ -158,4 +174,13 @@ fn wishes_and_alphas_that_cannot_be_are_refused() {
     assert!(last_error().contains("alpha[5]"), "{}", last_error());
     fails(set(&vec![0.25; count], 0), TOILE_E_ARGUMENT);
     assert_eq!(garment.json(), before);
+    // a garment may get its regions before its fabric: whole, it is refused as a simulation of it is
+    let bare = square(0.012, 0.0);
+    let alpha = vec![1.0; count];
+    ok(unsafe { toile_garment_set_blend_vertices(bare.0, alpha.as_ptr(), count, 0) });
+    fails(unsafe { toile_garment_check(bare.0) }, TOILE_E_ARGUMENT);
+    assert!(last_error().contains("has no yarns"), "{}", last_error());
+    let fabric = WEAVE.to_bytes();
+    ok(unsafe { toile_garment_set_fabric(bare.0, fabric.as_ptr().cast(), fabric.len()) });
+    ok(unsafe { toile_garment_check(bare.0) });
 }

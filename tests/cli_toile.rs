@@ -699,8 +699,29 @@ fn a_region_is_suggested_drawn_and_written_as_a_garment() {
     let mixed = folder.write("scene.json", &scene.to_string());
     let info = text(&toile(&["info", path(&mixed)]).stdout);
     assert!(info.contains("carried nodes"), "{info}");
+    // each error by its own name, each criterion of each vertex
+    assert!(said.contains("rms over area") && said.contains("those that are left"));
+    let criteria = region["criteria"].as_object().unwrap();
+    assert_eq!(criteria.len(), 6);
+    for values in criteria.values() {
+        assert_eq!(values.as_array().unwrap().len(), alpha.len());
+    }
+    assert!(region["suggested"]["cost"]["yarn_nodes"].as_u64().unwrap() <= 900);
+    assert_eq!(region["left_out"], json!([]));
+    let seam_only = ["wrinkle", "mesh", "curvature", "strain", "stress"];
+    let without: Vec<&str> = seam_only.iter().flat_map(|c| ["--without", *c]).collect();
+    let output = toile(&[&base[..], &["--tolerance", "0.3"], &without].concat());
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    assert_eq!(read("region.json")["left_out"], json!(seam_only));
+    assert_eq!(read("region.json")["blend_regions"], json!([]));
     // neither tolerance nor budget, and one that is none
     assert_eq!(code(&toile(&base)), 2);
+    assert_eq!(
+        code(&toile(
+            &[&base[..], &["--budget", "9", "--without", "bend"]].concat()
+        )),
+        2
+    );
     let refused = toile(&[&base[..], &["--tolerance", "0"]].concat());
     assert_eq!(code(&refused), 1);
     assert!(
@@ -708,4 +729,117 @@ fn a_region_is_suggested_drawn_and_written_as_a_garment() {
         "{}",
         text(&refused.stderr)
     );
+}
+
+/// Of a scene that moves the largest errors of its run are judged, or of the part of it that is asked for, and it is said which; a scene
+/// that pulls yarns cannot be judged by triangles.
+#[test]
+fn suggestions_say_which_states_they_judged() {
+    let folder = Folder::new("suggest_motion");
+    let out = path(&folder.0).to_owned();
+    let example = |name: &str| {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
+        path(&file.join(name)).to_owned()
+    };
+    let swing = example("swing.json");
+    let full = |more: &[&str]| {
+        let base = ["suggest", &swing, "--out", &out, "--picture-size", "60x60"];
+        let done = toile(&[&base[..], &["--tolerance", "0.02"], more].concat());
+        assert_eq!(code(&done), 0, "{}", text(&done.stderr));
+        let region = std::fs::read_to_string(folder.0.join("region.json")).unwrap();
+        let region: Value = serde_json::from_str(&region).unwrap();
+        let error = region["triangles"]["errors"]["largest"].as_f64().unwrap();
+        (text(&done.stdout).to_owned(), error)
+    };
+    let (said, still) = full(&["--until", "0"]);
+    assert!(said.contains("the scene's run of 0.15 s is not judged") && still < 1e-9);
+    let (said, half) = full(&["--until", "0.0749"]);
+    assert!(said.contains("every step to 0.0725 s"), "{said}");
+    let (said, all) = full(&[]);
+    assert!(said.contains("every step to 0.15 s"), "{said}");
+    assert!(
+        still < half && half <= all && all > 0.02,
+        "{still} {half} {all}"
+    );
+    let base = ["suggest", &swing, "--out", &out, "--budget", "99"];
+    let late = toile(&[&base[..], &["--until", "0.2"]].concat());
+    assert_eq!(code(&late), 1);
+    assert!(text(&late.stderr).contains("ends at 0.15 s"));
+    let pulled = toile(&[
+        "suggest",
+        &example("pull_out.json"),
+        "--budget",
+        "99",
+        "--out",
+        &out,
+    ]);
+    assert_eq!(code(&pulled), 1);
+    let said = text(&pulled.stderr);
+    assert!(
+        said.contains("triangles alone") && said.contains("pins[1]"),
+        "{said}"
+    );
+}
+
+/// `--compare` compares the region that it writes, whether it is asked for by numbers or costs what the drawn one does, and leaves a report.
+#[test]
+fn a_comparison_is_of_the_region_that_was_asked_for() {
+    let folder = Folder::new("suggest_compare");
+    let out = path(&folder.0).to_owned();
+    let square = json!([[0, 0], [0.03, 0], [0.03, 0.03], [0, 0.03]]);
+    let middle = json!([
+        [0.0045, 0.0045],
+        [0.0255, 0.0045],
+        [0.0255, 0.0255],
+        [0.0045, 0.0255]
+    ]);
+    let scene = json!({
+        "toile": 1, "name": "hung",
+        "garment": {
+            "toile_garment": 1, "name": "g", "edge_length": 0.003,
+            "panels": [{"name": "p", "fabric": "y", "vertices": square,
+                "edges": [[0, 1], [1, 2], [2, 3], [3, 0]]}],
+            "fabrics": [{"name": "y", "density": 0.3,
+                "membrane": {"warp": 1963.5, "weft": 1963.5, "shear": 40, "coupling": 0},
+                "yarns": {"weave": "plain", "warp_pitch": 0.001, "radius": 0.00025,
+                    "young": 1e7, "shear": 1.6e5, "density": 1.5e-4}}],
+            "blend_regions": [{"panel": "p", "polygon": middle}],
+        },
+        "gravity": [0, 0, -9.81],
+        "pins": [{"panel": "p", "edge": 1}, {"panel": "p", "uv": [0, 0], "target": [0.003, 0, 0]}],
+        "numbers": {"yarn.sliding": 0, "solver.drape.force_tolerance": 1e-9, "solver.drape.max_steps": 2000},
+    });
+    let file = folder.write("scene.json", &scene.to_string());
+    let read = |name: &str| -> Value {
+        serde_json::from_str(&std::fs::read_to_string(folder.0.join(name)).unwrap()).unwrap()
+    };
+    let base = [
+        "suggest",
+        path(&file),
+        "--compare",
+        "--out",
+        &out,
+        "--picture-size",
+        "60x60",
+    ];
+    for (more, asked) in [(&[][..], None), (&["--budget", "300"], Some(300))] {
+        let done = toile(&[&base[..], more].concat());
+        assert_eq!(code(&done), 0, "{}", text(&done.stderr));
+        let models = read("report.json")["models"].clone();
+        let nodes = |k: usize| models[k]["yarn_nodes"].as_u64().unwrap();
+        let names = [0, 1, 2, 3].map(|k| models[k]["name"].clone());
+        assert_eq!(names, ["triangles", "drawn", "suggested", "yarns"]);
+        let told = &read("region.json")["suggested"]["cost"]["yarn_nodes"];
+        assert_eq!(told.as_u64().unwrap(), nodes(2));
+        let most = asked.unwrap_or_else(|| nodes(1));
+        assert!(
+            nodes(2) <= most && nodes(2) > most / 2,
+            "{} of {most}",
+            nodes(2)
+        );
+        assert!(text(&std::fs::read(folder.0.join("report.html")).unwrap()).contains("hung"));
+        assert!(folder.0.join("report.csv").is_file());
+    }
+    let late = toile(&[&base[..], &["--until", "0"]].concat());
+    assert_eq!(code(&late), 2);
 }

@@ -14,6 +14,7 @@ mod self_contact_cases;
 mod sheets;
 mod terms_cases;
 mod tri_common;
+mod wave_cases;
 mod yarn_cases;
 mod yarn_common;
 mod yarn_pull;
@@ -84,6 +85,7 @@ mod mixed_pucker;
 mod mixed_riders;
 #[path = "mixed_scenes.rs"]
 mod mixed_scenes;
+mod mixed_waves;
 #[path = "pattern_bytes.rs"]
 mod pattern_bytes;
 #[path = "pattern_check.rs"]

@@ -276,6 +276,8 @@ def test_garments_are_edited_and_read():
     assert garment.panel_index(garment.panel_names[0]) == 0
     with pytest.raises(toile.ToileError, match="gone"):
         garment.panel_index("gone")
+    garment.set_blend_region(0, [[0, 0], [0.1, 0], [0.1, 0.1]])
+    assert json.loads(garment.to_json())["blend_regions"][0].get("rings", 0) == 0
     garment.set_blend_region(0, [[0, 0], [0.1, 0], [0.1, 0.1]], rings=3)
     assert json.loads(garment.to_json())["blend_regions"][0]["rings"] == 3
     garment.set_blend_region(0, np.empty((0, 2)))
@@ -351,6 +353,13 @@ def test_a_suggested_region_goes_into_the_garment():
         assert 0 < found.yarn_nodes <= 100 and sim.vertex_errors.max() > 0.01
         with pytest.raises(toile.UsageError, match="tolerance or a budget"):
             sim.suggest_region()
+        criteria = sim.vertex_criteria
+        assert criteria.shape == (len(positions), len(toile.CRITERIA))
+        assert np.allclose(np.sqrt((criteria**2).sum(1)), sim.vertex_errors)
+        rest = [name for name in toile.CRITERIA if name != "seam"]
+        assert not sim.suggest_region(tolerance=0.01, left_out=rest)[0].any()
+        with pytest.raises(ValueError, match="none of"):
+            sim.suggest_region(tolerance=0.01, left_out=["bend"])
         with pytest.raises(ValueError):
             sim.suggest_region(budget=-1)
         # live: vertices stay where they are

@@ -10,10 +10,11 @@ from ._body import Body
 from ._errors import DataError, NumericsError, ToileError, UsageError
 from ._ffi import lib
 from ._garment import Edge, Garment
-from ._report import Energies, Outcome, Report, Suggestion, SystemInfo, YarnChanges
+from ._report import CRITERIA, Energies, Outcome, Report, Suggestion, SystemInfo, YarnChanges
 from ._sim import Sim
 
 __all__ = [
+    "CRITERIA",
     "Body",
     "DataError",
     "Edge",

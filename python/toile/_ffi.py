@@ -130,7 +130,7 @@ STRUCTS: dict[str, list[tuple[str, Any]]] = {
         ("tolerance", c_double),
         ("budget", c_uint64),
         ("rings", c_uint32),
-        ("reserved", c_uint32),
+        ("left_out", c_uint32),
     ],
     "toile_suggestion": [
         ("tolerance", c_double),
@@ -146,6 +146,7 @@ STRUCTS: dict[str, list[tuple[str, Any]]] = {
         ("time_ratio", c_double),
         ("all_yarn_nodes", c_uint64),
         ("all_time_ratio", c_double),
+        ("iteration_ratio", c_double),
     ],
     "toile_view_f64": [
         ("data", POINTER(c_double)),
@@ -301,6 +302,7 @@ FUNCTIONS: dict[str, tuple[Any, list[Any]]] = {
         [handle, _p("toile_suggest_desc"), _f64, c_size_t, _size, _p("toile_suggestion")],
     ),
     "toile_sim_vertex_errors": (c_int32, _copy_f64),
+    "toile_sim_vertex_criteria": (c_int32, _copy_f64),
     "toile_sim_yarn_changes": (c_int32, [handle, _p("toile_yarn_changes")]),
     "toile_sim_locate_yarn_node": (c_int32, [handle, c_uint32, _f64, _u32]),
     "toile_sim_yarn_end": (c_int32, [handle, c_uint32, c_uint32, _u32]),

@@ -165,7 +165,7 @@ class Garment(_Owner):
         """Makes one panel of the fabric with this number."""
         _check(lib.toile_garment_set_panel_fabric(self.handle, panel, fabric))
 
-    def set_blend_region(self, panel: int, polygon: Array, rings: int = 2) -> None:
+    def set_blend_region(self, panel: int, polygon: Array, rings: int = 0) -> None:
         """Asks for every yarn inside a polygon of a panel, flat coordinates [m], shape (n, 2), with
         `rings` hybrid rings around it. Takes the place of the panel's earlier region; no corners take
         it away."""

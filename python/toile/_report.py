@@ -91,13 +91,17 @@ class YarnChanges:
     nodes_left: int
 
 
+#: What the error of triangles is made of, in the order of :attr:`Sim.vertex_criteria`.
+CRITERIA = ("wrinkle", "mesh", "curvature", "strain", "stress", "seam")
+
+
 @dataclass(frozen=True)
 class Suggestion:
-    """What a suggested region of yarns leaves and costs, as predicted before it is built."""
+    """What a suggested region of yarns leaves and costs: nodes and unknowns counted, time and memory predicted."""
 
     #: The wanted tolerance, or what the budget allows.
     tolerance: float
-    #: Error of triangles alone, and of those that are left, rms over the area.
+    #: Error of triangles alone, and of those that are left, rms over their area.
     error: float
     error_left: float
     #: Largest error of a triangle that is left.
@@ -112,11 +116,13 @@ class Suggestion:
     unknowns: int
     #: Memory of the simulation [bytes].
     bytes: int
-    #: Time of a drape over that of triangles alone.
+    #: Time of a drape that begins where triangles rest, theirs included, over that of triangles alone.
     time_ratio: float
     #: Nodes with yarns wherever fabrics have them, and the time of that.
     all_yarn_nodes: int
     all_time_ratio: float
+    #: Time of a Newton iteration over that of triangles alone.
+    iteration_ratio: float
 
 
 def _fields(value: Any) -> dict[str, Any]:

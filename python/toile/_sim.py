@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from pathlib import Path
-from typing import Any, Callable, Optional
+from typing import Any, Callable, Optional, Sequence
 
 import numpy as np
 
@@ -29,7 +29,7 @@ from ._garment import Garment
 from ._interrupt import _Interrupts
 from ._kept import _kept
 from ._owner import _Owner
-from ._report import Energies, Report, Suggestion, SystemInfo, YarnChanges, _fields, _report
+from ._report import CRITERIA, Energies, Report, Suggestion, SystemInfo, YarnChanges, _fields, _report
 
 #: ``progress(fraction, stage, residual)``; returning ``False`` stops the drape.
 ProgressCallback = Callable[[float, str, float], Optional[bool]]
@@ -134,7 +134,7 @@ class Sim(_Owner):
         """Velocity of the air [m/s], shape (3,)."""
         _check(lib.toile_sim_set_wind(self.handle, _vector(wind, 3, "wind")))
 
-    def set_blend_region(self, panel: int, polygon: Array, rings: int = 2) -> None:
+    def set_blend_region(self, panel: int, polygon: Array, rings: int = 0) -> None:
         """Moves the region of a panel in which every yarn is simulated, as
         :meth:`Garment.set_blend_region` says it, with the state carried over: yarns come into the triangles as
         these are. The yarns' arrays change."""
@@ -384,16 +384,24 @@ class Sim(_Owner):
         return _copy(lib.toile_sim_yarn_nodes_along, np.uint32, self.handle, panel, edge)
 
     def suggest_region(
-        self, tolerance: float = 0.0, budget: int = 0, rings: int = 0
+        self,
+        tolerance: float = 0.0,
+        budget: int = 0,
+        rings: int = 0,
+        left_out: Sequence[str] = (),
     ) -> tuple[np.ndarray, Suggestion]:
         """Where yarns would change the answer, from the present state of triangles alone: `alpha` of each
         vertex, shape (vertices,), for :meth:`set_blend_vertices`, here or of a garment, and what it leaves and costs. At least
         one of `tolerance`, the error around a vertex above which triangles give way, and `budget`, the most nodes
-        of yarns as predicted."""
+        of yarns. `left_out` are those of :data:`CRITERIA` that do not count in the error."""
         if not 0 <= budget < 2**64:
             raise ValueError(f"budget: {budget} must be from 0 to 2^64 - 1")
         desc = _ffi.new("toile_suggest_desc")
+        unknown = set(left_out) - set(CRITERIA)
+        if unknown:
+            raise ValueError(f"left_out: {sorted(unknown)} are none of {CRITERIA}")
         desc.tolerance, desc.budget, desc.rings = tolerance, budget, rings
+        desc.left_out = sum(1 << CRITERIA.index(name) for name in set(left_out))
         out = _ffi.new("toile_suggestion")
         alpha = np.empty(len(self.vertex_panels))
         _check(
@@ -413,6 +421,13 @@ class Sim(_Owner):
         """Estimated error of the deformation's gradient of triangles at each vertex, shape (vertices,); 0 where
         the fabric has no yarns."""
         return _copy(lib.toile_sim_vertex_errors, np.float64, self.handle)
+
+    @property
+    def vertex_criteria(self) -> np.ndarray:
+        """What :attr:`vertex_errors` is made of, shape (vertices, 6): the estimate by each of :data:`CRITERIA`; the
+        error is the root of the sum of their squares."""
+        values = _copy(lib.toile_sim_vertex_criteria, np.float64, self.handle)
+        return values.reshape(-1, len(CRITERIA))
 
     @property
     def yarn_changes(self) -> YarnChanges:

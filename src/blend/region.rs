@@ -34,16 +34,10 @@ impl Region {
     /// The triangles that a garment's blend regions hold and the rings around them. A region whose fabric has
     /// no yarns, one that holds no triangle, and rings that differ or are too many are refused.
     pub fn new(garment: &Garment, mesh: &GarmentMesh) -> Result<Self> {
+        garment.check_yarns()?;
         let mut within = vec![false; mesh.uv.len()];
-        for (k, region) in garment.blend_regions.iter().enumerate() {
+        for region in &garment.blend_regions {
             let panel = &garment.panels[region.panel as usize];
-            if garment.fabrics[panel.fabric].yarns.is_none() {
-                return Err(Error::argument(format!(
-                    "panel '{}' has fabric '{}', which has no yarns",
-                    panel.name, garment.fabrics[panel.fabric].name
-                ))
-                .at(place(k)));
-            }
             let [low, high] = panel.bounds()?.unwrap_or([Vec2::zeros(); 2]);
             let tolerance = TOLERANCE * (high - low).norm();
             let holds = region.holds(panel, tolerance)?;

@@ -352,6 +352,7 @@ pub unsafe extern "C" fn toile_garment_set_blend_vertices(
         edit(garment, |g| {
             // estimates are rough; far more vertices than values are refused before they are made
             let most = 2 * alpha.len() + 1000;
+            g.blend_regions.clear();
             g.check_within(most)?;
             let mesh = triangulate(g, 1.0, most)?;
             g.blend_regions = trace::from_alpha(&mesh, &alpha, rings)?;

@@ -10,7 +10,8 @@ use crate::error::Error;
 use crate::pattern::export;
 use std::ffi::c_char;
 
-/// Refuses a garment that cannot be, naming panel, edge or seam, as toile_sim_create would.
+/// Refuses a garment that cannot be, naming panel, edge, seam or blend region, as toile_sim_create would; what only triangles and
+/// laid yarns tell, such as a region that holds no triangle, is left to that.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn toile_garment_check(garment: *const toile_garment) -> toile_status {
     entry!({ read(garment, |object| object.garment.check()) })

@@ -16,8 +16,9 @@ use crate::sim::Sim;
 /// shape [count, 2], with `rings` hybrid rings around it, in the place of the panel's earlier regions; a count of 0 takes them away.
 /// Yarns that come in lie in the triangles as these are and move with them; vertices stay where they are. The arrays of yarns
 /// change their sizes and numbers, the epoch of toile_sim_yarn_changes grows; states that were saved under other regions are refused.
-/// What toile_sim_create refuses is refused; TOILE_E_STATE: a held vertex would follow yarns, a held node would go or ride
-/// on triangles, or the region leaves out where yarns have come out of contacts.
+/// Where held vertices begin to follow yarns, the nodes on their edges and beside them are held in their place, as far from their
+/// targets as these were; where yarns go, the vertices beside held nodes are. What toile_sim_create refuses is refused; TOILE_E_STATE: nothing
+/// can take a pin's place, or the region leaves out where yarns have come out of contacts.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn toile_sim_set_blend_region(
     sim: *mut toile_sim,

@@ -9,8 +9,20 @@
 //! unknowns = 3 (nodes that move + vertices with triangles of their own)
 //! ```
 //!
-//! The time of a drape is the power 1.8 of the unknowns, fitted to the mixed and whole drapes of `examples/pucker.json`, `sleeve.json` and `doll_skirt.json`, from which
-//! they are up to six times away, and memory a line through the models of `examples/pucker.json`. Unknowns of sliding are left out: they come and go with the contacts that slide.
+//! Time is what a Newton iteration takes, and how many there are. With `u` the unknowns over those of triangles alone,
+//!
+//! ```text
+//! iteration = 1.25 u,   drape = 1 + 2.6 iteration
+//! ```
+//!
+//! both over those of triangles alone. The first holds within a factor of 1.5 on `examples/pucker.json`, `sleeve.json` and `doll_skirt.json`, with suggested
+//! regions and with yarns everywhere, 780 to 8 500 unknowns, as steps after yarns were laid have it: factors of such sizes grow
+//! as the unknowns do, and so do those of parts up to 800 000 (`docs/benchmarks.md`). The second counts the triangles' drape and from where they rest the one with
+//! yarns, which took 0.9 to 7 times the triangles' iterations there and lies within a factor of 2.3, up or down, of nine drapes. No time of a
+//! step is predicted, as nothing in the triangles' state tells its iterations: `examples/swing.json` takes 3 a step by every model, while the first ten
+//! steps after yarns were laid in the gathers of those three took 6 to 81 where triangles took one or two.
+//!
+//! Memory is a line through the models of `examples/pucker.json`. Unknowns of sliding are left out: they come and go with the contacts that slide.
 
 use crate::blend::Region;
 use crate::math::{Vec2, topology};
@@ -26,12 +38,14 @@ const LOOP_NODES: f64 = 4.0;
 const BEYOND: [f64; 2] = [1.6, 0.8];
 /// Nodes of a seam's rod for each yarn that ends there, on either side.
 const ROD: f64 = 0.5;
-/// Power of the unknowns that the time of a drape grows with.
-const TIME_EXPONENT: f64 = 1.8;
+/// Time of a Newton iteration by unknowns where yarns are, over that by those of triangles.
+const ITERATION: f64 = 1.25;
+/// Newton iterations of a drape with yarns that begins where triangles rest, over those that triangles took to it.
+const ITERATIONS: f64 = 2.6;
 /// Memory [bytes]: of what every simulation has, and of each unknown with its terms, matrix and factor.
 const BYTES: [f64; 2] = [3.7e6, 4300.0];
 
-/// Predicted cost.
+/// Predicted cost; numbers of nodes and unknowns are counted where yarns were laid to tell.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Cost {
     /// Nodes of yarns, carried ones included.
@@ -42,8 +56,10 @@ pub struct Cost {
     pub triangles: u64,
     /// Scalar unknowns.
     pub unknowns: u64,
-    /// Time over that of triangles alone.
+    /// Time of a drape over that of triangles alone, which it begins with.
     pub time_ratio: f64,
+    /// Time of a Newton iteration over that of triangles alone.
+    pub iteration_ratio: f64,
     /// Memory [bytes].
     pub bytes: u64,
 }
@@ -157,13 +173,32 @@ impl<'a> Predictor<'a> {
         }
         let vertices = bare.iter().filter(|bare| !**bare).count();
         let unknowns = 3.0 * (own + vertices as f64);
-        Cost {
+        let cost = Cost {
             yarn_nodes: (own + beyond).ceil() as u64,
             carried_nodes: beyond.ceil() as u64,
             triangles: kept.len() as u64,
-            unknowns: unknowns.ceil() as u64,
-            time_ratio: (unknowns / (3 * self.mesh.uv.len()) as f64).powf(TIME_EXPONENT),
-            bytes: (BYTES[0] + unknowns * BYTES[1]) as u64,
+            ..Cost::default()
+        };
+        cost.with_unknowns(unknowns.ceil() as u64, self.mesh.uv.len())
+    }
+}
+
+impl Cost {
+    /// The same with so many unknowns on a mesh of so many vertices, and what follows from them.
+    #[must_use]
+    pub fn with_unknowns(self, unknowns: u64, vertices: usize) -> Self {
+        let more = unknowns as f64 / (3 * vertices.max(1)) as f64;
+        let [iteration_ratio, time_ratio] = if self.yarn_nodes == 0 {
+            [1.0; 2]
+        } else {
+            [ITERATION * more, 1.0 + ITERATIONS * ITERATION * more]
+        };
+        Self {
+            unknowns,
+            time_ratio,
+            iteration_ratio,
+            bytes: (BYTES[0] + unknowns as f64 * BYTES[1]) as u64,
+            ..self
         }
     }
 }

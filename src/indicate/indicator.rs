@@ -8,8 +8,8 @@
 //! | criterion | estimate |
 //! |---|---|
 //! | wrinkle | `sqrt(2 e)`, `e = |E_n| (1 - N_cr/N)` where the pressure `N = -n.S n` is above `N_cr = D_n pi^2/h^2` |
-//! | mesh | `rms(x - q)/h`, the distance of the neighbours from the quadratic surface `q(u, v)` that fits them best |
-//! | curvature | `(k h)^2/24 + max(0, k d - 0.15)` with the largest principal curvature `k` of `q` |
+//! | mesh | `rms(x - q)/h + (k h)^2/24`, the distance of the neighbours from the quadratic surface `q(u, v)` that fits them best, with its largest principal curvature `k` |
+//! | curvature | `d max(0, k - k_fit)` |
 //! | strain | beyond the range of the fit, and `3/2 E^2` of a stretched membrane without ridges |
 //! | stress | `|E - E*|`, `E*` the mean of the triangles at the corners |
 //! | seam | `atan(0.15 |k_n| min(sqrt(D_n/N), L/2))` at sewn vertices, with the curvature `k_n` of `q` across the seam |
@@ -18,9 +18,10 @@
 //!   1961, section 2.1; `e_cr = D pi^2/(C h^2)`), into a half wave `A sin(pi s/h)` which the triangles cannot have. It takes
 //!   up the strain `e = (pi A/h)^2/4`, and its slope is `pi A/(sqrt(2) h) = sqrt(2 e)` in the mean. `D_n` is the rigidity along the pressure.
 //! * **mesh**: what a mesh follows well is smooth over two edges; of a wave that is short against that, much is left. As in
-//!   estimates by recovered gradients (Zienkiewicz and Zhu 1987) the better solution is made from the neighbours' own.
-//! * **curvature**: the arc of an edge is longer than its chord by `(k h)^2/24`; and beyond the range of the tests that
-//!   triangles are fitted to ([`Range`]) yarns bend around each other.
+//!   estimates by recovered gradients (Zienkiewicz and Zhu 1987) the better solution is made from the neighbours' own. And the arc of an
+//!   edge is longer than its chord by `(k h)^2/24`.
+//! * **curvature**: beyond the range of the tests that triangles are fitted to, `k_fit` ([`Range`], 0.15 over the pitch), yarns bend around
+//!   each other. It knows no triangles: the same bend has the same error on every mesh that follows it.
 //! * **strain**: yarns are linear in their length, Saint Venant-Kirchhoff membranes in Green strain: tensions differ by `3/2 E` of their
 //!   size. Beyond the tests a material says nothing, and the strain that is beyond counts whole.
 //! * **stress**: strain is constant in a triangle and jumps to the next, as far as it is not resolved (Zienkiewicz and Zhu 1987).
@@ -32,6 +33,8 @@
 //! ```text
 //! error = sqrt(wrinkle^2 + mesh^2 + curvature^2 + strain^2 + stress^2 + seam^2)
 //! ```
+//!
+//! Whoever asks may leave criteria out of that sum. Of a motion, every value is the largest of its states ([`Indicator::widen`]).
 //!
 //! Values of triangles are those of vertices by means of squares over the
 //! area. A panel with fewer than eight vertices has no surface fitted, and a fabric without yarns no error.
@@ -49,6 +52,9 @@ use std::f64::consts::PI;
 /// Names of the criteria, in the order of [`Indicator::criteria`].
 pub const CRITERIA: [&str; 6] = ["wrinkle", "mesh", "curvature", "strain", "stress", "seam"];
 
+/// Which of [`CRITERIA`] do not count.
+pub type LeftOut = [bool; CRITERIA.len()];
+
 /// Part of the slope of a free strip that a seam's panels take when its moment is let go.
 const FREED: f64 = 0.15;
 /// Coefficients of a quadratic surface.
@@ -61,15 +67,20 @@ const POINTS: usize = 8;
 pub struct Indicator {
     /// Estimate by each of [`CRITERIA`] at each vertex.
     pub criteria: Vec<[f64; CRITERIA.len()]>,
-    /// All together.
+    /// Those that count, together.
     pub error: Vec<f64>,
     /// Flat area of each triangle [m^2].
     pub areas: Vec<f64>,
 }
 
 impl Indicator {
-    /// Of a garment at these positions of its vertices.
-    pub fn new(garment: &Garment, mesh: &GarmentMesh, positions: &[Vec3]) -> Result<Self> {
+    /// Of a garment at these positions of its vertices, without some criteria in the error.
+    pub fn new(
+        garment: &Garment,
+        mesh: &GarmentMesh,
+        positions: &[Vec3],
+        left_out: &LeftOut,
+    ) -> Result<Self> {
         let cloth = Cloth::new(garment, mesh.clone())?;
         let near = Neighbours::new(mesh);
         let ranges: Vec<Option<Range>> = (garment.fabrics.iter())
@@ -107,10 +118,9 @@ impl Indicator {
                 continue;
             };
             let [a, b] = yarns.structure.pitch();
-            let tested = Range::of(yarns).curvature * a.max(b);
             let k = surface.curvature.symmetric_eigenvalues().amax();
-            values[1] = surface.rest;
-            values[2] = (k * surface.edge).powi(2) / 24.0 + (k * a.max(b) - tested).max(0.0);
+            values[1] = surface.rest + (k * surface.edge).powi(2) / 24.0;
+            values[2] = (k - Range::of(yarns).curvature).max(0.0) * a.max(b);
             if let Some(n) = across[v].try_normalize(1e-12) {
                 let m = material_rotation(cloth.panel_grain[panel]) * n;
                 let tension = m.dot(&(tensor(&stresses[v]) * m)) / area;
@@ -119,7 +129,10 @@ impl Indicator {
                 values[5] = (FREED * k * fades.min(0.5 * widths[panel])).atan();
             }
         }
-        let norm = |c: &[f64; CRITERIA.len()]| c.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let norm = |c: &[f64; CRITERIA.len()]| {
+            let counted = c.iter().zip(left_out).filter(|(_, left_out)| !**left_out);
+            counted.map(|(x, _)| x * x).sum::<f64>().sqrt()
+        };
         Ok(Self {
             error: criteria.iter().map(norm).collect(),
             criteria,
@@ -127,13 +140,35 @@ impl Indicator {
         })
     }
 
-    /// Error of a triangle: the mean of its corners.
-    pub fn of_triangle(&self, mesh: &GarmentMesh, t: usize) -> f64 {
-        mesh.triangles[t]
-            .iter()
-            .map(|v| self.error[*v as usize])
-            .sum::<f64>()
-            / 3.0
+    /// Takes the larger of its own values and another state's.
+    pub fn widen(&mut self, other: &Self) {
+        for (own, other) in self.criteria.iter_mut().zip(&other.criteria) {
+            for (own, other) in own.iter_mut().zip(other) {
+                *own = own.max(*other);
+            }
+        }
+        for (own, other) in self.error.iter_mut().zip(&other.error) {
+            *own = own.max(*other);
+        }
+    }
+
+    /// Root mean square over the area, and the largest, of values at vertices in those triangles that are `kept`; the value of a
+    /// triangle is the mean of its corners'. Zero where none is.
+    pub fn over(
+        &self,
+        mesh: &GarmentMesh,
+        value: impl Fn(usize) -> f64,
+        kept: impl Fn(usize) -> bool,
+    ) -> [f64; 2] {
+        let [mut sum, mut area, mut largest] = [0.0_f64; 3];
+        for (t, tri) in mesh.triangles.iter().enumerate().filter(|p| kept(p.0)) {
+            let mean = tri.iter().map(|v| value(*v as usize)).sum::<f64>() / 3.0;
+            sum += mean * mean * self.areas[t];
+            area += self.areas[t];
+            largest = largest.max(mean);
+        }
+        let rms = if area > 0.0 { (sum / area).sqrt() } else { 0.0 };
+        [rms, largest]
     }
 }
 

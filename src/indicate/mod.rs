@@ -1,8 +1,9 @@
 //! Where yarns would change the answer: from a state of triangles alone to a region of yarns and what it costs.
 //!
 //! [`indicator`] estimates an error of the triangles at every vertex, [`grow`] makes a region of the places where it is
-//! above a tolerance, [`cost`] predicts what that region costs. A budget of nodes is met by the least tolerance whose region keeps to
-//! it. Everything here reads the mesh and positions alone, one vertex after the other, so that nothing depends on threads.
+//! above a tolerance, [`cost`] predicts what that region costs. A budget of nodes is met by the least tolerance whose region is predicted
+//! to keep to it; whoever can lay yarns counts them and corrects the budget ([`crate::sim::Sim::suggest_region`]). Everything here reads
+//! the mesh and positions alone, one vertex after the other, so that nothing depends on threads.
 
 pub mod cost;
 pub mod grow;
@@ -10,13 +11,12 @@ pub mod indicator;
 
 use crate::blend::{Region, trace};
 use crate::error::{Error, Result};
-use crate::math::Vec3;
 use crate::pattern::{BlendRegion, Garment};
 use crate::tri::GarmentMesh;
 use crate::yarn::Cell;
 use cost::{Cost, Predictor};
 use grow::Growth;
-use indicator::Indicator;
+use indicator::{Indicator, LeftOut};
 
 /// Least tolerance: errors below it are those of rounding and of a drape's own residual.
 pub const LEAST_TOLERANCE: f64 = 1e-3;
@@ -29,10 +29,12 @@ pub struct Wish {
     /// Error, as a root mean square around a vertex, above which triangles give way; `None` is [`LEAST_TOLERANCE`], with
     /// a budget.
     pub tolerance: Option<f64>,
-    /// Most nodes of yarns, as [`cost`] predicts them; `None` is no limit.
+    /// Most nodes of yarns; `None` is no limit.
     pub budget: Option<u64>,
     /// Hybrid rings around the region.
     pub rings: u32,
+    /// Criteria that do not count.
+    pub left_out: LeftOut,
 }
 
 /// A region and why.
@@ -46,10 +48,10 @@ pub struct Suggestion {
     pub regions: Vec<BlendRegion>,
     /// The tolerance that the region is one for: the wish's, or what its budget allows.
     pub tolerance: f64,
-    /// Root mean square of the error over the area, of triangles alone and of those that are left.
-    pub errors: [f64; 2],
-    /// Largest error of triangles that are left.
-    pub largest_left: f64,
+    /// Error of triangles alone: root mean square over their area, and of the worst one ([`Indicator::over`]).
+    pub whole: [f64; 2],
+    /// The same of those that are left.
+    pub left: [f64; 2],
     /// Prediction for the region.
     pub cost: Cost,
     /// Prediction for triangles alone.
@@ -72,6 +74,11 @@ impl Wish {
                 "tolerance {tolerance} must be from {LEAST_TOLERANCE} to {LARGEST_TOLERANCE}"
             )));
         }
+        if self.left_out.iter().all(|left_out| *left_out) {
+            return Err(Error::argument(
+                "every criterion is left out: nothing tells where yarns are needed",
+            ));
+        }
         if self.budget == Some(0) {
             return Err(Error::argument("a budget of 0 yarn nodes allows no yarns"));
         }
@@ -80,11 +87,11 @@ impl Wish {
     }
 }
 
-/// The region that a garment of triangles alone wants at these positions. `cells` says how fabrics are laid.
+/// The region that a garment of triangles alone wants for these errors. `cells` says how fabrics are laid.
 pub fn suggest(
     garment: &Garment,
     mesh: &GarmentMesh,
-    positions: &[Vec3],
+    indicator: Indicator,
     cells: &[Cell],
     wish: &Wish,
 ) -> Result<Suggestion> {
@@ -99,7 +106,6 @@ pub fn suggest(
         ));
     }
     let may: Vec<bool> = mesh.triangle_panel.iter().map(|p| has_yarns(*p)).collect();
-    let indicator = Indicator::new(garment, mesh, positions)?;
     if let Some(v) = indicator.error.iter().position(|e| !e.is_finite()) {
         return Err(Error::argument(format!(
             "the error at vertex {v} is {}: its place or those beside it are no state of cloth",
@@ -124,23 +130,12 @@ pub fn suggest(
         tolerance = levels[first.min(levels.len() - 1)];
         (region, cost) = at(tolerance);
     }
-    let left = |all: bool| {
-        let kept = (0..mesh.triangles.len()).filter(|t| all || !region.full[*t]);
-        let [sum, area] = kept.fold([0.0; 2], |[sum, area], t| {
-            let e = indicator.of_triangle(mesh, t);
-            [sum + e * e * indicator.areas[t], area + indicator.areas[t]]
-        });
-        if area > 0.0 { (sum / area).sqrt() } else { 0.0 }
-    };
-    let largest_left = (0..mesh.triangles.len())
-        .filter(|t| !region.full[*t])
-        .map(|t| indicator.of_triangle(mesh, t))
-        .fold(0.0, f64::max);
+    let error = |v: usize| indicator.error[v];
     let none = Region::around(mesh, vec![false; may.len()], 0);
     let all = Region::around(mesh, may, 0);
     Ok(Suggestion {
-        errors: [left(true), left(false)],
-        largest_left,
+        whole: indicator.over(mesh, error, |_| true),
+        left: indicator.over(mesh, error, |t| !region.full[t]),
         regions: trace::polygons(mesh, &region.full, wish.rings),
         tolerance,
         cost,

@@ -31,11 +31,28 @@ impl Garment {
         self.check_within(DEFAULT_MAX_VERTICES)
     }
 
-    /// [`Garment::check_geometry`], and that the estimated vertex count of the triangulation is at
+    /// [`Garment::check_geometry`], [`Garment::check_yarns`], and that the estimated vertex count of the triangulation is at
     /// most `max_vertices`.
     pub fn check_within(&self, max_vertices: usize) -> Result<()> {
         self.check_geometry()?;
+        self.check_yarns()?;
         self.check_vertices(1.0, max_vertices)
+    }
+
+    /// Refuses blend regions of panels whose fabric has no yarns. A garment on its way may get its fabrics after its regions, so
+    /// that this is asked of whole ones only.
+    pub fn check_yarns(&self) -> Result<()> {
+        for (k, region) in self.blend_regions.iter().enumerate() {
+            let panel = &self.panels[region.panel as usize];
+            let fabric = &self.fabrics[panel.fabric];
+            if fabric.yarns.is_none() {
+                return Err(Error::argument(format!(
+                    "blend_regions[{k}]: panel '{}' has fabric '{}', which has no yarns",
+                    panel.name, fabric.name
+                )));
+            }
+        }
+        Ok(())
     }
 
     /// Checks the estimated vertex count alone, with target lengths times `scale`. An error names the

@@ -18,7 +18,7 @@
 mod page;
 mod rivals;
 
-pub use rivals::rivals;
+pub use rivals::{rivals, same_cost};
 
 use crate::blend::embed::carried;
 use crate::error::{Error, Result};

@@ -11,7 +11,7 @@
 //!   strain there, again in every change.
 //!
 //! Velocities are those of the cloth, so the momentum changes as the mass does where yarns do not weigh what triangles do. Yarns that
-//! came out of contacts must stay whole: triangles cannot tell what has come apart.
+//! came out of contacts must stay whole: triangles cannot tell what has come apart. Pins pass from vertices to yarns and back ([`super::hold`]).
 
 use super::yarns::YarnPart;
 use super::{Compiled, Sim};
@@ -22,7 +22,7 @@ use crate::math::Vec3;
 use crate::pattern::BlendRegion;
 use crate::solve::engine::Engine;
 use crate::system::points::Points;
-use crate::system::state::{BodyAnchor, PairAnchor, Pin, State};
+use crate::system::state::{BodyAnchor, PairAnchor, State};
 use crate::system::yarn::friction::loose;
 use crate::yarn::names::Name;
 use crate::yarn::{Names, Topology, YarnMesh};
@@ -54,14 +54,14 @@ struct Was<'a> {
 }
 
 /// For what there is now its number before.
-struct Before {
-    nodes: Vec<Option<u32>>,
+pub(super) struct Before {
+    pub(super) nodes: Vec<Option<u32>>,
     passages: Vec<Option<u32>>,
 }
 
 impl Sim {
     /// Puts these regions of yarns in the place of those that there are and carries the state over; nothing changes on error. A region
-    /// that cannot be is refused, and so is one in which a held point would not move by itself any more or
+    /// that cannot be is refused, and so is one in which a held point would not move by itself any more and nothing takes its place, or
     /// what yarns have left would be laid anew.
     pub fn set_blend_regions(&mut self, regions: Vec<BlendRegion>) -> Result<RegionChange> {
         let mut garment = self.garment.clone();
@@ -270,7 +270,7 @@ impl Sim {
         Ok(())
     }
 
-    /// Pins, which must go on holding what moves by itself, and friction anchors of what still touches.
+    /// Pins, which go on holding what moves by itself, and friction anchors of what still touches.
     fn carry_holds(
         &self,
         before: &Before,
@@ -289,15 +289,7 @@ impl Sim {
             None => Some(point),
             Some(node) => now[node].map(|n: u32| n + count as u32),
         };
-        let holds = |point: u32| part.is_none_or(|part| part.lets_hold(point, count as u32));
-        state.pins = (self.state.pins.iter())
-            .map(|pin| {
-                let vertex = there(pin.vertex).filter(|p| holds(*p));
-                let vertex = vertex.ok_or_else(|| self.held(pin.vertex))?;
-                Ok(Pin { vertex, ..*pin })
-            })
-            .collect::<Result<_>>()?;
-        state.pins.sort_by_key(|p| p.vertex);
+        state.pins = self.carry_pins(before, part, there, state)?;
         let touches = |p: u32| there(p).filter(|p| points.areas[*p as usize] > 0.0);
         state.body_anchors = (self.state.body_anchors.iter())
             .filter_map(|a| touches(a.vertex).map(|vertex| BodyAnchor { vertex, ..*a }))
@@ -317,19 +309,6 @@ impl Sim {
             .collect();
         state.pair_anchors.sort_by_key(|p| (p.a, p.b));
         Ok(())
-    }
-
-    fn held(&self, point: u32) -> Error {
-        let what = self.name(point);
-        Error::state(if (point as usize) < self.mesh.uv.len() {
-            format!(
-                "{what} is held and would follow the yarns of the region: let it go first, and hold nodes of yarns afterwards"
-            )
-        } else {
-            format!(
-                "{what} is held and would not move by itself: let it go first, and hold vertices afterwards"
-            )
-        })
     }
 }
 

@@ -1,17 +1,18 @@
 //! Newton's first system in a step of a weave with yarns in its middle and one ring around them.
 //!
-//! A square hangs from two corners in a gentle wave, at rest before.
+//! A square hangs from two corners in a gentle wave, at rest before, and may touch a plane beneath its trough.
 
 use std::f64::consts::PI;
 use std::sync::Arc;
 use toile::blend::blended::{self, BlendOptions};
 use toile::blend::{Filter, Region};
+use toile::body::Body;
 use toile::cloth::Cloth;
 use toile::math::Vec3;
 use toile::math::block::BlockMatrix;
 use toile::math::parallel::Workers;
 use toile::pattern::import::garment_from_json;
-use toile::sim::Settings;
+use toile::sim::{ContactSettings, Settings};
 use toile::system::assemble::{Assembler, fix_rows};
 use toile::system::bodies::BodySet;
 use toile::system::build::{BuildOptions, System};
@@ -23,6 +24,21 @@ use toile::tri::triangulate;
 use toile::yarn::{Layout, Topology, YarnMaterial, Yarns, lay};
 
 const PITCH: f64 = 1e-3;
+/// Height of the wave over the side.
+const WAVE: f64 = 0.03;
+/// Gap over the plane that is kept free [m].
+const GAP: f64 = 5e-4;
+
+/// What yarns do.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Yarning {
+    /// They slide nowhere.
+    Tied,
+    /// They slide everywhere in the full region.
+    Slides,
+    /// They do, and the lowest part of the wave lies on a plane.
+    SlidesAndTouches,
+}
 
 /// One Newton system.
 pub(crate) struct Case {
@@ -35,11 +51,13 @@ pub(crate) struct Case {
     /// Blocks that are held.
     pub(crate) fixed: Vec<bool>,
     pub(crate) right: Vec<Vec3>,
+    /// Points that touch the plane.
+    pub(crate) touching: usize,
 }
 
-/// A square of `side` with triangles of `ratio` pitches, yarns in `[low, high]` squared; steps of `h` [s]. Yarns slide
-/// everywhere in the full region, or nowhere.
-pub(crate) fn case(side: f64, ratio: f64, [low, high]: [f64; 2], h: f64, sliding: bool) -> Case {
+/// A square of `side` with triangles of `ratio` pitches, yarns in `[low, high]` squared; steps of `h` [s].
+pub(crate) fn case(side: f64, ratio: f64, [low, high]: [f64; 2], h: f64, yarning: Yarning) -> Case {
+    let sliding = yarning != Yarning::Tied;
     let radius = 0.25 * PITCH;
     let area = PI * radius * radius;
     let stretch = 1e7 * area / PITCH;
@@ -95,11 +113,11 @@ pub(crate) fn case(side: f64, ratio: f64, [low, high]: [f64; 2], h: f64, sliding
         System::with_yarns(cloth, Some(yarns.clone()), joined.coupling, &build).expect("system");
     let all = mesh.uv.iter().chain(&yarns.mesh.uv);
     let mut positions: Vec<Vec3> = all
-        .map(|p| Vec3::new(p.x, p.y, 0.03 * side * (2.0 * PI * p.x / side).sin()))
+        .map(|p| Vec3::new(p.x, p.y, WAVE * side * (2.0 * PI * p.x / side).sin()))
         .collect();
     system.points.coupling.carry(&mut positions);
     let u: Vec<f64> = yarns.mesh.incidences.iter().map(|i| i.u).collect();
-    let state = State {
+    let mut state = State {
         time: 0.0,
         velocities: vec![Vec3::zeros(); positions.len()],
         positions,
@@ -120,7 +138,18 @@ pub(crate) fn case(side: f64, ratio: f64, [low, high]: [f64; 2], h: f64, sliding
         wind: Vec3::zeros(),
         pressure: 0.0,
     };
-    let bodies = BodySet::default();
+    let mut bodies = BodySet::default();
+    let deep = 0.9 * WAVE * side;
+    if yarning == Yarning::SlidesAndTouches {
+        let plane = Body::plane([0.0, 0.0, 1.0], -deep - GAP).expect("plane");
+        let contact = ContactSettings {
+            thickness: GAP,
+            ..ContactSettings::default()
+        };
+        let body = bodies.add(&plane, &contact);
+        state.bodies.push(body);
+        (bodies.prepare(&state, 1.0, &Workers::new(1))).expect("bodies");
+    }
     let world = World {
         gravity: state.gravity,
         wind: state.wind,
@@ -177,7 +206,13 @@ pub(crate) fn case(side: f64, ratio: f64, [low, high]: [f64; 2], h: f64, sliding
     let right = (gradient.iter().zip(&fixed))
         .map(|(g, fixed)| if *fixed { Vec3::zeros() } else { -g })
         .collect();
+    let low = |p: &usize| points.areas[*p] > 0.0 && x[*p].z < -deep;
     Case {
+        touching: if state.bodies.is_empty() {
+            0
+        } else {
+            (0..points.count()).filter(low).count()
+        },
         filter,
         masses: (system.points.masses.iter())
             .map(|m| m.max(1e-15) / (h * h))

@@ -1,7 +1,9 @@
 //! The command line.
 
+use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
+use toile::indicate::indicator::CRITERIA;
 
 /// Sews, drapes and moves garments.
 #[derive(Parser)]
@@ -136,17 +138,25 @@ pub(crate) struct FabricArgs {
 pub(crate) struct SuggestArgs {
     #[command(flatten)]
     pub(crate) scene: SceneArgs,
-    /// Error of the deformation's gradient, as a root mean square around a vertex, above which triangles give way to yarns, 0.001 to 1000; needed without a budget.
-    #[arg(long, value_name = "T", required_unless_present = "budget")]
+    /// Error of the deformation's gradient, as a root mean square around a vertex, above which triangles give way to yarns, 0.001 to 1000.
+    #[arg(long, value_name = "T", required_unless_present_any = ["budget", "compare"])]
     pub(crate) tolerance: Option<f64>,
-    /// Most nodes of yarns, as predicted.
+    /// Most nodes of yarns.
     #[arg(long, value_name = "N")]
     pub(crate) budget: Option<u64>,
-    /// Hybrid rings around the region, 0 to 3.
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    pub(crate) rings: u32,
-    /// Also drapes the scene's own regions, suggested ones of as many nodes, and yarns everywhere, and compares them.
-    #[arg(long)]
+    /// Hybrid rings around the region, 0 to 3; by default 0, with --compare as many as the scene's regions have.
+    #[arg(long, value_name = "N")]
+    pub(crate) rings: Option<u32>,
+    /// Leaves a criterion out of the error; may be given several times.
+    #[arg(long, value_name = "CRITERION", value_parser = PossibleValuesParser::new(CRITERIA))]
+    pub(crate) without: Vec<String>,
+    /// How much of the scene's run is judged [s], by default all: the error of a vertex is the largest after any of its steps. 0 judges
+    /// the drape alone.
+    #[arg(long, value_name = "SECONDS")]
+    pub(crate) until: Option<f64>,
+    /// Also drapes the scene's own regions, the suggested ones, and yarns everywhere, compares them at rest, and writes report.json, report.csv
+    /// and report.html. Without tolerance and budget the suggested ones have no more nodes than the scene's own.
+    #[arg(long, conflicts_with = "until")]
     pub(crate) compare: bool,
     /// Width and height of the picture [pixel].
     #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size)]

@@ -14,11 +14,16 @@ pub(crate) fn report(args: &SceneArgs, dir: &Path) -> Done {
     })?;
     let scene = load(args)?;
     let report = toile::report::run(&scene, &mut |name| err(&format!("{name}\n")))?;
+    write(&report, dir)?;
+    out(&table(&report))
+}
+
+/// The report's files.
+pub(crate) fn write(report: &Report, dir: &Path) -> Result<(), Failure> {
     let json = format!("{:#}\n", report.to_json());
     file(&dir.join("report.json"), json.as_bytes())?;
     file(&dir.join("report.csv"), report.to_csv().as_bytes())?;
-    file(&dir.join("report.html"), report.to_html().as_bytes())?;
-    out(&table(&report))
+    file(&dir.join("report.html"), report.to_html().as_bytes())
 }
 
 /// One line for each model.

@@ -95,17 +95,7 @@ pub(crate) fn run(args: &RunArgs) -> Done {
     let origin = sim.time();
     bar.set_message("step");
     for step in 1..=steps {
-        let time = scene.run.time_after(step);
-        driver.set(&mut sim, &scene, origin + time)?;
-        let whole = step < steps || time == step as f64 * scene.run.dt;
-        let dt = if whole {
-            scene.run.dt
-        } else {
-            time - scene.run.time_after(step - 1)
-        };
-        let report = sim
-            .step(dt)
-            .map_err(|e| e.at(format!("step {step} of {steps}")))?;
+        let report = driver.step(&mut sim, &scene, origin, step)?;
         summary.take(&report);
         summary.steps += 1;
         last = Some(report);

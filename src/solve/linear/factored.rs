@@ -45,7 +45,7 @@ impl Preconditioner for SingleFactor {
         self.stiff.forget();
     }
 
-    fn apply(&mut self, r: &[Vec3], z: &mut [Vec3]) {
+    fn apply(&mut self, _matrix: &BlockMatrix, r: &[Vec3], z: &mut [Vec3]) {
         let solved = match &mut self.cholesky {
             Some(cholesky) => cholesky.solve(r, z, &self.workers),
             None => Err(LinearError::NoConvergence),

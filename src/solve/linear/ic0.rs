@@ -128,7 +128,7 @@ impl Preconditioner for IncompleteCholesky {
         result
     }
 
-    fn apply(&mut self, r: &[Vec3], z: &mut [Vec3]) {
+    fn apply(&mut self, _matrix: &BlockMatrix, r: &[Vec3], z: &mut [Vec3]) {
         let Some(plan) = &self.plan else {
             z.copy_from_slice(r);
             return;

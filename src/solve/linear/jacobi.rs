@@ -37,7 +37,7 @@ impl Preconditioner for BlockJacobi {
         Ok(())
     }
 
-    fn apply(&mut self, r: &[Vec3], z: &mut [Vec3]) {
+    fn apply(&mut self, _matrix: &BlockMatrix, r: &[Vec3], z: &mut [Vec3]) {
         for ((z, r), inverse) in z.iter_mut().zip(r).zip(&self.inverses) {
             *z = inverse * r;
         }

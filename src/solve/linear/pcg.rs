@@ -31,8 +31,8 @@ pub trait Preconditioner: Send {
     fn prepare(&mut self, matrix: &BlockMatrix) -> Result<(), LinearError>;
     /// Drops what was decided by the values of earlier matrices.
     fn forget(&mut self) {}
-    /// `z = M^-1 r` for the matrix last prepared.
-    fn apply(&mut self, r: &[Vec3], z: &mut [Vec3]);
+    /// `z = M^-1 r` for the matrix last prepared; `matrix` is the one that is solved for.
+    fn apply(&mut self, matrix: &BlockMatrix, r: &[Vec3], z: &mut [Vec3]);
     /// Bytes held.
     fn bytes(&self) -> usize;
 }
@@ -231,7 +231,7 @@ impl ConjugateGradients {
         limit: u32,
         iterations: &mut u32,
     ) -> Result<(), LinearError> {
-        self.preconditioner.apply(&self.r, &mut self.z);
+        self.preconditioner.apply(matrix, &self.r, &mut self.z);
         self.p.copy_from_slice(&self.z);
         let mut rz = dot(&self.r, &self.z);
         let mut rr = dot(&self.r, &self.r);
@@ -261,7 +261,7 @@ impl ConjugateGradients {
             }
             self.preconditioner.project(&mut self.r);
             rr = dot(&self.r, &self.r);
-            self.preconditioner.apply(&self.r, &mut self.z);
+            self.preconditioner.apply(matrix, &self.r, &mut self.z);
             let next = dot(&self.r, &self.z);
             let beta = next / rz;
             rz = next;

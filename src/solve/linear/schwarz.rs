@@ -92,7 +92,7 @@ impl Preconditioner for Schwarz {
         self.first_error()
     }
 
-    fn apply(&mut self, r: &[Vec3], z: &mut [Vec3]) {
+    fn apply(&mut self, _matrix: &BlockMatrix, r: &[Vec3], z: &mut [Vec3]) {
         self.workers.chunks(&mut self.parts, 1, |_, parts| {
             for part in parts {
                 part.done = part.solve(r);

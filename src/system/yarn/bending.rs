@@ -66,22 +66,22 @@ fn frame(q: &[f64; 11]) -> (Angle, f64) {
     (Angle::new(&a, &b, FLOOR * du.abs()), du)
 }
 
-/// Derivative of the angle by the scalars.
-fn by_nodes(bend: &Angle) -> [f64; 11] {
-    let [a, b] = bend.gradient();
+/// `-a`, `a - b` and `b` at the three nodes.
+fn by_nodes([a, b]: &[Vec3; 2]) -> [f64; 11] {
     let mut out = [0.0; 11];
     set_point(&mut out, 0, &-a);
     set_point(&mut out, 1, &(a - b));
-    set_point(&mut out, 2, &b);
+    set_point(&mut out, 2, b);
     out
 }
 
 impl Bending {
-    /// Derivative of the energy by the scalars, with `j` that of the angle.
-    fn force(&self, j: &[f64; 11], moment: f64, g: f64, du: f64, out: &mut [f64; 11]) {
-        *out = j.map(|j| j * moment);
-        out[9] = self.stiffness * g / (du * du);
+    /// Derivative of the energy by the scalars, with `g` that of the angle by both edges.
+    fn force(&self, g: &[Vec3; 2], moment: f64, law: f64, du: f64) -> [f64; 11] {
+        let mut out = by_nodes(&g.map(|g| g * moment));
+        out[9] = self.stiffness * law / (du * du);
         out[10] = -out[9];
+        out
     }
 
     fn moment(&self, at: &Local<'_, 11>, bend: &Angle, du: f64, g: &[f64; 3]) -> Moment {
@@ -135,7 +135,7 @@ impl Kernel<11> for Bending {
         let (bend, du) = frame(at.q);
         let g = law(bend.theta);
         let moment = self.moment(at, &bend, du, &g);
-        self.force(&by_nodes(&bend), moment.value, g[0], du, out);
+        *out = self.force(&bend.gradient(), moment.value, g[0], du);
     }
 
     fn derivatives(
@@ -148,8 +148,9 @@ impl Kernel<11> for Bending {
         let (bend, du) = frame(at.q);
         let g = law(bend.theta);
         let moment = self.moment(at, &bend, du, &g);
-        let j = by_nodes(&bend);
-        self.force(&j, moment.value, g[0], du, gradient);
+        let by_edges = bend.gradient();
+        let j = by_nodes(&by_edges);
+        *gradient = self.force(&by_edges, moment.value, g[0], du);
         add_square(out, moment.square(exactness), &j);
         bend.add_curvature(&WEIGHTS, &moment, exactness, out);
         // by du, and mixed

@@ -42,13 +42,12 @@ fn edges(q: &[f64; 9]) -> [Vec3; 2] {
     [point(q, 1) - middle, point(q, 2) - middle]
 }
 
-/// Derivative of the angle by the scalars.
-fn by_nodes(corner: &Angle) -> [f64; 9] {
-    let [a, b] = corner.gradient();
+/// `-(a + b)`, `a` and `b` at the three nodes.
+fn by_nodes([a, b]: &[Vec3; 2]) -> [f64; 9] {
     let mut out = [0.0; 9];
     set_point(&mut out, 0, &-(a + b));
-    set_point(&mut out, 1, &a);
-    set_point(&mut out, 2, &b);
+    set_point(&mut out, 1, a);
+    set_point(&mut out, 2, b);
     out
 }
 
@@ -102,7 +101,7 @@ impl Kernel<9> for Shear {
     fn gradient(&self, at: &Local<'_, 9>, out: &mut [f64; 9]) {
         let corner = self.corner(at.q);
         let moment = self.moment(at, &corner).value;
-        *out = by_nodes(&corner).map(|j| j * moment);
+        *out = by_nodes(&corner.gradient().map(|g| g * moment));
     }
 
     fn derivatives(
@@ -114,8 +113,9 @@ impl Kernel<9> for Shear {
     ) {
         let corner = self.corner(at.q);
         let moment = self.moment(at, &corner);
-        let j = by_nodes(&corner);
-        *gradient = j.map(|j| j * moment.value);
+        let by_edges = corner.gradient();
+        let j = by_nodes(&by_edges);
+        *gradient = by_nodes(&by_edges.map(|g| g * moment.value));
         add_square(out, moment.square(exactness), &j);
         corner.add_curvature(&WEIGHTS, &moment, exactness, out);
     }

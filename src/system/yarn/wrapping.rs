@@ -223,10 +223,9 @@ impl Kernel<12> for Wrapping {
         let x = points(at.q);
         let (moment, energy) = Self::moments(&self.parts(at.start, self.angle(&x)));
         let guards = guards(&x, self.length_floor());
-        let w = guards[0].value * guards[1].value;
         let g = flat(&self.angle_gradient(&x), 1.0);
         let dw = flat(&guard_gradient(&guards), 1.0);
-        *out = combined(moment * w, &g, energy, &dw);
+        *out = combined(moment * guards[0].value * guards[1].value, &g, energy, &dw);
     }
 
     fn derivatives(
@@ -246,7 +245,7 @@ impl Kernel<12> for Wrapping {
             flat(&psi_gradient, 1.0),
             flat(&guard_gradient(&guards), 1.0),
         );
-        *gradient = combined(moment * w, &g, energy, &dw);
+        *gradient = combined(moment * guards[0].value * guards[1].value, &g, energy, &dw);
         // square of the gradient of angle sqrt(w), which has no root in it
         let root = w.sqrt();
         let over = if root > 1e-12 { 0.5 / root } else { 0.0 };

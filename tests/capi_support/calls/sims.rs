@@ -198,8 +198,8 @@ pub(super) fn read_sim(world: &World, choices: &mut Choices<'_>) -> toile_status
     let body = choices.index();
     let point = choices.numbers(3);
     let status = unsafe {
-        match choices.below(31) {
-            26 => toile_sim_yarn_curves(sim, choices.index(), out, capacity, needed),
+        match choices.below(32) {
+            31 => toile_sim_yarn_curves(sim, choices.index(), out, capacity, needed),
             27 => toile_sim_yarn_curve_offsets(sim, choices.index(), out.cast(), capacity, needed),
             28 => toile_sim_yarn_uv(sim, out, capacity, needed),
             29 => toile_sim_yarn_radii(sim, out, capacity, needed),
@@ -208,12 +208,14 @@ pub(super) fn read_sim(world: &World, choices: &mut Choices<'_>) -> toile_status
                 toile_sim_yarn_nodes_along(sim, body, edge, out.cast(), capacity, needed)
             }
             24 => toile_sim_vertex_errors(sim, out, capacity, needed),
+            26 => toile_sim_vertex_criteria(sim, out, capacity, needed),
             25 => {
                 let mut wish = filled(toile_suggest_desc_init);
                 wish.struct_size = size(choices, wish.struct_size);
                 wish.tolerance = choices.near(0.1);
                 wish.budget = u64::from(choices.index());
                 wish.rings = choices.index();
+                wish.left_out = choices.index();
                 let mut found = filled(toile_suggestion_init);
                 found.struct_size = size(choices, found.struct_size);
                 let (wish, found) = (choices.maybe(&wish), choices.maybe_mut(&mut found));

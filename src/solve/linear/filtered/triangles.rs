@@ -129,8 +129,8 @@ impl Triangles {
         Cholesky::for_pattern(&mut self.factor, &self.matrix.pattern)?.prepare(&self.matrix)
     }
 
-    /// `z += W (W^T A W)^-1 W^T r`.
-    pub(super) fn add(&mut self, r: &[Vec3], z: &mut [Vec3]) -> Result<(), LinearError> {
+    /// `z += sign W (W^T A W)^-1 W^T r`.
+    pub(super) fn add(&mut self, sign: f64, r: &[Vec3], z: &mut [Vec3]) -> Result<(), LinearError> {
         let mut right = std::mem::take(&mut self.right);
         right.fill(Vec3::zeros());
         for (i, r) in r.iter().enumerate() {
@@ -143,7 +143,7 @@ impl Triangles {
         self.right = right;
         for (i, z) in z.iter_mut().enumerate() {
             for (v, w) in self.of(i) {
-                *z += self.answer[*v as usize] * *w;
+                *z += self.answer[*v as usize] * (sign * *w);
             }
         }
         solved
