@@ -43,7 +43,7 @@ impl Table {
             "strain.max",
             Quantity::MaxStrain,
             "",
-            "largest relative stretch of an edge",
+            "largest relative stretch of an edge or of yarn",
         );
         (v.min, v.nominal) = (Some(0.0), Some(0.1));
         if !scene.bodies.is_empty() {
