@@ -407,7 +407,7 @@ fn pieces_that_do_not_fit_are_refused() {
         .unwrap_err()
         .message;
     assert!(
-        error.contains("4 loops and 2 rows") && error.contains("3 and 5"),
+        error.contains("4 loops and 2 rows") && error.contains("3 loops across and 5 rows"),
         "{error}"
     );
     let huge = patch(knit(stockinette()), 40_000, 20_000);
