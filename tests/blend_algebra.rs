@@ -584,7 +584,7 @@ fn the_mass_preconditioner_is_the_filtered_inverse() {
         r[*p] = Vec3::from_fn(|_, _| numbers.next());
     }
     let mut z = vec![Vec3::zeros(); n];
-    preconditioner.apply(&matrix, &r, &mut z);
+    preconditioner.apply(&mut |x, y| matrix.multiply(x, y), &r, &mut z);
     for c in 0..3 {
         let right = DVector::from_iterator(size, free.iter().map(|p| r[*p][c]));
         let filtered = &s * t.transpose() * right;

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use toile::blend::{Rider, Riders};
 use toile::math::parallel::Workers;
 use toile::math::{Mat3, Vec3};
-use toile::system::assemble::{Assembler, energy};
+use toile::system::assemble::{Assembler, Products, energy};
 use toile::system::bodies::BodySet;
 use toile::system::term::{Configuration, HessianKind, Stencils, Term, World};
 
@@ -192,11 +192,37 @@ fn what_belongs_to_riders_goes_to_their_carriers_by_the_transpose() {
     }
     let value = energy(&terms, &at, &workers);
     assert!((value - 0.5 * v.dot(&expected)).abs() < 1e-13);
+    let products = Products {
+        terms: &terms,
+        at,
+        kind: HessianKind::Exact,
+        riders: &riders,
+        workers: &workers,
+    };
+    let mut work = Vec::new();
+    let mut diagonal = Assembler::of_diagonal(all, &terms, &riders);
+    diagonal.add(
+        &terms,
+        &at,
+        Some(HessianKind::Exact),
+        &workers,
+        &mut gradient,
+    );
+    assert_eq!(diagonal.matrix().blocks.len(), all);
+    for (point, block) in diagonal.matrix().blocks.iter().enumerate() {
+        let slot = assembler.matrix().pattern.starts[point] as usize;
+        assert_eq!(*block, assembler.matrix().blocks[slot]);
+    }
     for column in 0..3 * free {
         let mut unit = vec![Vec3::zeros(); all];
         unit[column / 3][column % 3] = 1.0;
         let mut answer = vec![Vec3::zeros(); all];
         assembler.matrix().multiply(&unit, &mut answer);
+        let mut product = vec![Vec3::zeros(); all];
+        products.add(&unit, &mut product, &mut work);
+        for (a, b) in answer.iter().zip(&product) {
+            assert!((a - b).norm() < 1e-13, "{column}: {a} {b}");
+        }
         for row in 0..3 * all {
             let wanted = if row < 3 * free {
                 reduced[(row, column)]

@@ -133,7 +133,7 @@ pub fn drape(
             return stopped(engine, state, all);
         }
     }
-    let small = engine.system.block_count() <= rest::LARGEST;
+    let small = engine.has_matrix() && engine.system.block_count() <= rest::LARGEST;
     let near = pin_part(engine, state, FAR) == 1.0;
     let mut reached = Rest::None;
     if small && near && !flat && !open && !crumpled {

@@ -78,10 +78,9 @@ pub enum Motion {
 impl Engine {
     /// A solver for a system.
     pub fn new(system: System, settings: &Settings) -> Self {
-        let n = system.block_count();
-        let assembler = Assembler::new(n, &system.terms, &system.points.coupling.riders);
         let workers = Workers::new(settings.threads as usize);
         let linear = linear_solver(&system, settings, &workers);
+        let assembler = assembler(&system, linear.as_ref());
         Self {
             assembler,
             linear,
@@ -113,8 +112,7 @@ impl Engine {
         }
         self.system.set_options(&settings.into())?;
         self.settings = settings.clone();
-        self.assembler
-            .rebuild(self.system.block_count(), &self.system.terms);
+        self.assembler = assembler(&self.system, self.linear.as_ref());
         Ok(())
     }
 
@@ -152,6 +150,11 @@ impl Engine {
     /// Bytes of the solver's factor and work arrays.
     pub fn factor_bytes(&self) -> usize {
         self.linear.bytes() + self.direct.bytes()
+    }
+
+    /// Whether there is a matrix to factor, and not its diagonal blocks alone.
+    pub fn has_matrix(&self) -> bool {
+        !self.linear.is_matrix_free()
     }
 
     /// Bytes of the matrix and the scatter plans.
@@ -484,6 +487,16 @@ fn go_on(system: &System, state: &State, h: f64, fixed: &[bool], x: &mut [Vec3])
         }
     }
     points.coupling.carry(x);
+}
+
+/// What the linear solver wants of matrices.
+fn assembler(system: &System, linear: &dyn LinearSolver) -> Assembler {
+    let (n, riders) = (system.block_count(), &system.points.coupling.riders);
+    if linear.is_matrix_free() {
+        Assembler::of_diagonal(n, &system.terms, riders)
+    } else {
+        Assembler::new(n, &system.terms, riders)
+    }
 }
 
 /// The solver that factors every matrix as it is.

@@ -14,7 +14,7 @@ use crate::error::{Error, Result, Status};
 use crate::math::Vec3;
 use crate::math::block::BlockMatrix;
 use crate::math::parallel::Workers;
-use crate::system::assemble::{Assembler, energy, fix_rows};
+use crate::system::assemble::{Assembler, Products, energy, fix_rows};
 use crate::system::term::{Configuration, HessianKind, Term, World};
 
 /// The quadratic part of the incremental potential.
@@ -124,6 +124,8 @@ pub struct Work {
     negative: Vec<Vec3>,
     direction: Vec<Vec3>,
     trial: Vec<Vec3>,
+    /// Of products without a matrix.
+    products: Vec<Vec3>,
     local: Local,
 }
 
@@ -245,6 +247,38 @@ impl Problem<'_> {
             }
         }
         residual
+    }
+
+    /// `y = A p` with the Hessian of `Phi` at `x`, as [`Self::derivatives`] assembles it.
+    fn times(
+        &self,
+        x: &[Vec3],
+        kind: HessianKind,
+        p: &[Vec3],
+        y: &mut [Vec3],
+        work: &mut Vec<Vec3>,
+    ) {
+        for ((y, p), w) in y.iter_mut().zip(p).zip(self.inertia.weight) {
+            *y = p * *w;
+        }
+        let products = Products {
+            terms: self.terms,
+            at: self.at(x),
+            kind,
+            riders: &self.coupling.riders,
+            workers: self.workers,
+        };
+        // what is fixed has zeros in `p`
+        products.add(p, y, work);
+        for (block, c) in self.idle {
+            let (block, c) = (*block as usize, usize::from(*c));
+            y[block][c] = p[block][c];
+        }
+        for ((y, p), fixed) in y.iter_mut().zip(p).zip(self.fixed) {
+            if *fixed {
+                *y = *p;
+            }
+        }
     }
 
     /// The gradient of `Phi` where it is free.
@@ -377,13 +411,20 @@ impl Problem<'_> {
                 }
                 let matrix = assembler.matrix();
                 let prepared = if kept { Ok(()) } else { linear.prepare(matrix) };
+                let Work {
+                    negative,
+                    direction,
+                    products,
+                    ..
+                } = work;
                 let solved = prepared.and_then(|()| {
-                    linear.solve(
-                        matrix,
-                        &work.negative,
-                        &mut work.direction,
-                        tolerance.linear,
-                    )
+                    if linear.is_matrix_free() {
+                        let mut product =
+                            |p: &[Vec3], y: &mut [Vec3]| self.times(x, kind, p, y, products);
+                        linear.solve_by(&mut product, negative, direction, tolerance.linear)
+                    } else {
+                        linear.solve(matrix, negative, direction, tolerance.linear)
+                    }
                 });
                 match solved {
                     Ok(iterations) => {

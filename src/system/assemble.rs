@@ -2,9 +2,10 @@
 //!
 //! Kernels run in parallel over chunks of stencils into a buffer; the scatter into vertices and
 //! blocks runs in stencil order, so that the result has the same bits for any number of threads.
-//! What belongs to a point that rides on a triangle goes to the vertices that carry it.
+//! What belongs to a point that rides on a triangle goes to the vertices that carry it. A matrix may be assembled
+//! by its diagonal blocks alone; the product with the whole of it is then that of the stencils' Hessians.
 
-use super::term::{Configuration, HessianKind, Term};
+use super::term::{Configuration, HessianKind, MAX_BLOCKS, Stencils, Term};
 use crate::blend::Riders;
 use crate::math::block::{BlockMatrix, BlockPattern};
 use crate::math::parallel::Workers;
@@ -18,6 +19,8 @@ const CHUNK: usize = 128;
 const TRANSPOSED: u32 = 1 << 31;
 /// Set in an entry of a plan that is a number of a spread instead of a slot.
 const SPREAD: u32 = 1 << 30;
+/// An entry of a plan for a block that is not in the matrix.
+const NOWHERE: u32 = SPREAD - 1;
 
 /// One of the blocks that a block with a rider goes to.
 #[derive(Clone, Copy, Debug)]
@@ -45,6 +48,8 @@ pub struct Assembler {
     plans: Vec<Vec<u32>>,
     spreads: Spreads,
     riders: Riders,
+    /// Whether the matrix has its diagonal blocks alone.
+    diagonal: bool,
     gradients: Vec<Vec3>,
     blocks: Vec<Mat3>,
 }
@@ -52,11 +57,21 @@ pub struct Assembler {
 impl Assembler {
     /// Pattern and plans for the present stencils of the terms.
     pub fn new(vertex_count: usize, terms: &[Box<dyn Term>], riders: &Riders) -> Self {
+        Self::of(vertex_count, terms, riders, false)
+    }
+
+    /// The same of the diagonal blocks alone.
+    pub fn of_diagonal(vertex_count: usize, terms: &[Box<dyn Term>], riders: &Riders) -> Self {
+        Self::of(vertex_count, terms, riders, true)
+    }
+
+    fn of(vertex_count: usize, terms: &[Box<dyn Term>], riders: &Riders, diagonal: bool) -> Self {
         let mut assembler = Self {
             matrix: BlockMatrix::zeros(BlockPattern::from_stencils(0, |_| {})),
             plans: Vec::new(),
             spreads: Spreads::default(),
             riders: riders.clone(),
+            diagonal,
             gradients: vec![Vec3::zeros(); BATCH_BLOCKS],
             blocks: vec![Mat3::zeros(); BATCH_BLOCKS],
         };
@@ -67,7 +82,11 @@ impl Assembler {
     /// Takes changed stencils. The pattern changes only where a new coupling asks for it.
     pub fn rebuild(&mut self, vertex_count: usize, terms: &[Box<dyn Term>]) {
         let riders = &self.riders;
+        let diagonal = self.diagonal;
         let pattern = BlockPattern::from_stencils(vertex_count, |sink| {
+            if diagonal {
+                return;
+            }
             let mut carriers = Vec::new();
             for term in terms {
                 let stencils = term.stencils();
@@ -161,26 +180,15 @@ impl Assembler {
                         }
                     }),
                 }
-                for k in 0..batch {
-                    let vertices = stencils.get(first + k);
-                    for (v, g) in vertices.iter().zip(&self.gradients[k * arity..]) {
-                        match self.riders.of(*v) {
-                            None => out[*v as usize] += g,
-                            Some(rider) => {
-                                let turn = self.riders.turn(*v);
-                                let g = turn.map_or(*g, |q| q.transpose() * g);
-                                for (v, w) in rider.vertices.iter().zip(&rider.weights) {
-                                    out[*v as usize] += g * *w;
-                                }
-                            }
-                        }
-                    }
-                }
+                scatter(&self.riders, stencils, first, gradients, out);
                 if kind.is_none() {
                     continue;
                 }
                 let slots = &self.plans[t][first * block_count..(first + batch) * block_count];
                 for (slot, block) in slots.iter().zip(&self.blocks) {
+                    if *slot == NOWHERE {
+                        continue;
+                    }
                     if slot & SPREAD != 0 {
                         self.spreads
                             .add((slot & !SPREAD) as usize, block, &mut self.matrix);
@@ -191,6 +199,89 @@ impl Assembler {
                         *target += block;
                     } else {
                         *target += block.transpose();
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Products `y = H x` with the sum of the terms' Hessians, without its matrix.
+pub struct Products<'a> {
+    /// The terms.
+    pub terms: &'a [Box<dyn Term>],
+    /// Where the Hessian is taken.
+    pub at: Configuration<'a>,
+    /// Which Hessian.
+    pub kind: HessianKind,
+    /// Points that ride.
+    pub riders: &'a Riders,
+    /// Threads.
+    pub workers: &'a Workers,
+}
+
+impl Products<'_> {
+    /// Adds `H x` to `y`; riders have no part in either. `work` is memory that lives on between calls.
+    pub fn add(&self, x: &[Vec3], y: &mut [Vec3], work: &mut Vec<Vec3>) {
+        let place = |point: u32| match self.riders.of(point) {
+            None => x[point as usize],
+            Some(rider) => {
+                let carriers = rider.vertices.iter().zip(&rider.weights);
+                let place: Vec3 = carriers.map(|(v, w)| x[*v as usize] * *w).sum();
+                self.riders.turn(point).map_or(place, |q| q * place)
+            }
+        };
+        work.resize(BATCH_BLOCKS, Vec3::zeros());
+        for term in self.terms {
+            let stencils = term.stencils();
+            let (count, arity) = (stencils.count(), stencils.arity);
+            if count == 0 || term.is_idle(&self.at) || !term.has_hessian(self.kind) {
+                continue;
+            }
+            let largest = BATCH_BLOCKS / arity;
+            for first in (0..count).step_by(largest) {
+                let products = &mut work[..largest.min(count - first) * arity];
+                self.workers.chunks(products, CHUNK * arity, |c, chunk| {
+                    let mut blocks = [Mat3::zeros(); MAX_BLOCKS];
+                    let blocks = &mut blocks[..arity * (arity + 1) / 2];
+                    for (k, product) in chunk.chunks_mut(arity).enumerate() {
+                        let e = first + c * CHUNK + k;
+                        term.hessian(e, &self.at, self.kind, blocks);
+                        product.fill(Vec3::zeros());
+                        let mut block = blocks.iter();
+                        for (i, a) in stencils.get(e).iter().enumerate() {
+                            for (j, b) in stencils.get(e)[..=i].iter().enumerate() {
+                                let Some(h) = block.next() else { break };
+                                product[i] += h * place(*b);
+                                if i != j {
+                                    product[j] += h.tr_mul(&place(*a));
+                                }
+                            }
+                        }
+                    }
+                });
+                scatter(self.riders, stencils, first, products, y);
+            }
+        }
+    }
+}
+
+/// Adds what stencils from the `first` on have for each of their points.
+fn scatter(
+    riders: &Riders,
+    stencils: Stencils<'_>,
+    first: usize,
+    parts: &[Vec3],
+    out: &mut [Vec3],
+) {
+    for (k, parts) in parts.chunks_exact(stencils.arity).enumerate() {
+        for (v, g) in stencils.get(first + k).iter().zip(parts) {
+            match riders.of(*v) {
+                None => out[*v as usize] += g,
+                Some(rider) => {
+                    let g = riders.turn(*v).map_or(*g, |q| q.transpose() * g);
+                    for (v, w) in rider.vertices.iter().zip(&rider.weights) {
+                        out[*v as usize] += g * *w;
                     }
                 }
             }
@@ -225,7 +316,10 @@ impl Spreads {
                 if i == j && p < q {
                     continue;
                 }
-                let slot = pattern.slot(p.max(q), p.min(q)).map_or(0, |s| s as u32);
+                let Some(slot) = pattern.slot(p.max(q), p.min(q)) else {
+                    continue;
+                };
+                let slot = slot as u32;
                 self.shares.push(Share {
                     slot: if p >= q { slot } else { slot | TRANSPOSED },
                     weight: wp * wq,
@@ -274,8 +368,11 @@ fn plan(
                     slots.push(spreads.plan(pattern, riders, i, j) | SPREAD);
                     continue;
                 }
-                let slot = pattern.slot(i.max(j), i.min(j)).map_or(0, |s| s as u32);
-                slots.push(if i >= j { slot } else { slot | TRANSPOSED });
+                slots.push(match pattern.slot(i.max(j), i.min(j)) {
+                    None => NOWHERE,
+                    Some(slot) if i >= j => slot as u32,
+                    Some(slot) => slot as u32 | TRANSPOSED,
+                });
             }
         }
     }

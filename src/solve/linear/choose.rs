@@ -66,6 +66,9 @@ const KEPT: u32 = 15;
 /// The same of yarns, and of the factors of parts.
 const KEPT_YARNS: [u32; 2] = [6, 4];
 
+/// Iterations without a matrix after which a direction is taken as it is.
+const MATRIX_FREE: u32 = 2_000;
+
 /// What a system is made of, as far as its matrices show it.
 #[derive(Clone, Copy)]
 pub enum Made<'a> {
@@ -78,8 +81,8 @@ pub enum Made<'a> {
 
 /// A solver by its number in the settings, for `n` block rows: 0 chooses for each matrix, 1 sparse
 /// Cholesky, 2 conjugate gradients with block Jacobi, 3 with incomplete Cholesky, 4 with the factor
-/// of an earlier matrix, 5 with the factors of its overlapping parts. Other numbers are taken as 0: the settings
-/// refuse them at the door.
+/// of an earlier matrix, 5 with the factors of its overlapping parts, 6 with block Jacobi and without the matrix. Other numbers are
+/// taken as 0: the settings refuse them at the door.
 pub fn solver(kind: u32, n: usize, made: Made<'_>, workers: &Workers) -> Box<dyn LinearSolver> {
     match kind {
         1 => Box::new(Direct::new(workers)),
@@ -87,17 +90,18 @@ pub fn solver(kind: u32, n: usize, made: Made<'_>, workers: &Workers) -> Box<dyn
         3 => Box::new(incomplete(made)),
         4 => Box::new(factored(made, workers)),
         5 => Box::new(parted(workers)),
+        6 => Box::new(matrix_free()),
         _ if n < ALWAYS_DIRECT => Box::new(Direct::new(workers)),
         _ => Box::new(Automatic::new(made, workers)),
     }
 }
 
-/// A solver under the constraints of blended rings, by the same numbers: 2 and 3 are conjugate gradients with diagonal blocks, 4 and 5
+/// A solver under the constraints of blended rings, by the same numbers: 2, 3 and 6 are conjugate gradients with diagonal blocks, 4 and 5
 /// with factors of overlapping parts, both with the triangles as a second level.
 pub fn filtered(kind: u32, filter: &Arc<Filter>, workers: &Workers) -> Box<dyn LinearSolver> {
     // vertices without energies have no diagonal blocks
     let beside = match kind {
-        2 | 3 if filter.bare().is_empty() => Beside::Blocks,
+        2 | 3 | 6 if filter.bare().is_empty() => Beside::Blocks,
         4 | 5 if filter.bare().is_empty() => Beside::Parts,
         _ => return Box::new(Constrained::new(filter, workers)),
     };
@@ -124,6 +128,13 @@ fn parted(workers: &Workers) -> ConjugateGradients {
     ConjugateGradients::new(Box::new(Schwarz::new(workers)))
         .for_newton(KEPT_YARNS[1])
         .in_energy()
+}
+
+fn matrix_free() -> ConjugateGradients {
+    ConjugateGradients::new(Box::new(BlockJacobi::new()))
+        .for_newton(0)
+        .with_limit(MATRIX_FREE)
+        .matrix_free()
 }
 
 fn incomplete(made: Made<'_>) -> ConjugateGradients {

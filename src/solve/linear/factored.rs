@@ -4,10 +4,10 @@
 //! factor of an earlier one need a handful of iterations, each at a tenth of the price of a new
 //! factor; single precision halves that price again and costs an iteration or two.
 
-use super::LinearError;
 use super::cholesky::Cholesky;
 use super::pcg::Preconditioner;
 use super::stiff_part::StiffPart;
+use super::{LinearError, Product};
 use crate::math::Vec3;
 use crate::math::block::BlockMatrix;
 use crate::math::parallel::Workers;
@@ -45,7 +45,7 @@ impl Preconditioner for SingleFactor {
         self.stiff.forget();
     }
 
-    fn apply(&mut self, _matrix: &BlockMatrix, r: &[Vec3], z: &mut [Vec3]) {
+    fn apply(&mut self, _product: Product<'_>, r: &[Vec3], z: &mut [Vec3]) {
         let solved = match &mut self.cholesky {
             Some(cholesky) => cholesky.solve(r, z, &self.workers),
             None => Err(LinearError::NoConvergence),

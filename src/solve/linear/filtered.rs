@@ -28,9 +28,9 @@
 mod diagonal;
 mod triangles;
 
-use super::LinearError;
 use super::pcg::Preconditioner;
 use super::schwarz::Schwarz;
+use super::{LinearError, Product};
 use crate::blend::Filter;
 use crate::math::Vec3;
 use crate::math::block::BlockMatrix;
@@ -87,7 +87,7 @@ impl Filtered {
 
     fn first(
         &mut self,
-        matrix: &BlockMatrix,
+        product: Product<'_>,
         r: &[Vec3],
         z: &mut [Vec3],
     ) -> Result<(), LinearError> {
@@ -103,7 +103,7 @@ impl Filtered {
                 r.fill(0.0);
             }
         }
-        parts.apply(matrix, &self.right, z);
+        parts.apply(product, &self.right, z);
         self.diagonal.project(z)
     }
 
@@ -111,7 +111,7 @@ impl Filtered {
     fn balanced(
         &mut self,
         triangles: &mut Triangles,
-        matrix: &BlockMatrix,
+        product: Product<'_>,
         r: &[Vec3],
         z: &mut [Vec3],
     ) -> Result<(), LinearError> {
@@ -122,12 +122,12 @@ impl Filtered {
             list.resize(r.len(), Vec3::zeros());
         }
         triangles.add(1.0, r, coarse)?;
-        matrix.multiply(coarse, left);
+        product(coarse, left);
         for (left, r) in left.iter_mut().zip(r) {
             *left = r - *left;
         }
-        self.first(matrix, left, z)?;
-        matrix.multiply(z, left);
+        self.first(product, left, z)?;
+        product(z, left);
         triangles.add(-1.0, left, z)?;
         for (z, coarse) in z.iter_mut().zip(&*coarse) {
             *z += coarse;
@@ -138,17 +138,17 @@ impl Filtered {
 
     fn levels(
         &mut self,
-        matrix: &BlockMatrix,
+        product: Product<'_>,
         r: &[Vec3],
         z: &mut [Vec3],
     ) -> Result<(), LinearError> {
         let Some(mut triangles) = self.triangles.take() else {
-            return self.first(matrix, r, z);
+            return self.first(product, r, z);
         };
         let done = if self.parts.is_some() {
-            self.balanced(&mut triangles, matrix, r, z)
+            self.balanced(&mut triangles, product, r, z)
         } else {
-            (self.first(matrix, r, z)).and_then(|()| triangles.add(1.0, r, z))
+            (self.first(product, r, z)).and_then(|()| triangles.add(1.0, r, z))
         };
         self.triangles = Some(triangles);
         done
@@ -198,8 +198,8 @@ impl Preconditioner for Filtered {
         triangles.prepare(matrix, &self.fixed)
     }
 
-    fn apply(&mut self, matrix: &BlockMatrix, r: &[Vec3], z: &mut [Vec3]) {
-        if self.levels(matrix, r, z).is_err() {
+    fn apply(&mut self, product: Product<'_>, r: &[Vec3], z: &mut [Vec3]) {
+        if self.levels(product, r, z).is_err() {
             // NaN is the iteration's sign of breakdown
             z.fill(Vec3::repeat(f64::NAN));
         }

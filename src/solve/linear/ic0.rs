@@ -15,9 +15,9 @@
 //! The factor is computed in f64 and applied in f64 or from an f32 copy: applying it is bound by
 //! memory, and rounding a preconditioner does not round the solution.
 
-use super::LinearError;
 use super::ordering::reverse_cuthill_mckee;
 use super::pcg::Preconditioner;
+use super::{LinearError, Product};
 use crate::math::block::{BlockMatrix, BlockPattern};
 use crate::math::{Mat3, Vec3};
 
@@ -128,7 +128,7 @@ impl Preconditioner for IncompleteCholesky {
         result
     }
 
-    fn apply(&mut self, _matrix: &BlockMatrix, r: &[Vec3], z: &mut [Vec3]) {
+    fn apply(&mut self, _product: Product<'_>, r: &[Vec3], z: &mut [Vec3]) {
         let Some(plan) = &self.plan else {
             z.copy_from_slice(r);
             return;

@@ -2,8 +2,8 @@
 //! with the square root of stiffness over mass; good for short steps only. A block that is not
 //! positive definite refuses the matrix.
 
-use super::LinearError;
 use super::pcg::Preconditioner;
+use super::{LinearError, Product};
 use crate::math::block::BlockMatrix;
 use crate::math::{Mat3, Vec3};
 
@@ -37,7 +37,7 @@ impl Preconditioner for BlockJacobi {
         Ok(())
     }
 
-    fn apply(&mut self, _matrix: &BlockMatrix, r: &[Vec3], z: &mut [Vec3]) {
+    fn apply(&mut self, _product: Product<'_>, r: &[Vec3], z: &mut [Vec3]) {
         for ((z, r), inverse) in z.iter_mut().zip(r).zip(&self.inverses) {
             *z = inverse * r;
         }

@@ -63,6 +63,25 @@ pub trait LinearSolver: Send {
         x: &mut [Vec3],
         tolerance: f64,
     ) -> Result<u32, LinearError>;
+    /// Whether it is content with the diagonal blocks of a matrix and calls for products with the whole of it:
+    /// [`solve_by`](Self::solve_by) is then called in the place of `solve`.
+    fn is_matrix_free(&self) -> bool {
+        false
+    }
+    /// The same as `solve` where `product(x, y)` gives `y = A x`.
+    fn solve_by(
+        &mut self,
+        product: Product<'_>,
+        b: &[Vec3],
+        x: &mut [Vec3],
+        tolerance: f64,
+    ) -> Result<u32, LinearError> {
+        let _ = (product, b, x, tolerance);
+        Err(LinearError::NoConvergence)
+    }
     /// Bytes held by factors and work arrays.
     fn bytes(&self) -> usize;
 }
+
+/// `y = A x` by `product(x, y)`.
+pub type Product<'a> = &'a mut dyn FnMut(&[Vec3], &mut [Vec3]);

@@ -10,7 +10,7 @@
 //! A direction of negative curvature gives `NotPositiveDefinite`. Sums run over vertices in order,
 //! so results do not depend on threads. No allocation while the size stays the same.
 
-use super::{LinearError, LinearSolver};
+use super::{LinearError, LinearSolver, Product};
 use crate::math::Vec3;
 use crate::math::block::{BlockMatrix, BlockPattern};
 
@@ -31,8 +31,8 @@ pub trait Preconditioner: Send {
     fn prepare(&mut self, matrix: &BlockMatrix) -> Result<(), LinearError>;
     /// Drops what was decided by the values of earlier matrices.
     fn forget(&mut self) {}
-    /// `z = M^-1 r` for the matrix last prepared; `matrix` is the one that is solved for.
-    fn apply(&mut self, matrix: &BlockMatrix, r: &[Vec3], z: &mut [Vec3]);
+    /// `z = M^-1 r` for the matrix last prepared; `product` is that of the one that is solved for.
+    fn apply(&mut self, product: Product<'_>, r: &[Vec3], z: &mut [Vec3]);
     /// Bytes held.
     fn bytes(&self) -> usize;
 }
@@ -63,6 +63,8 @@ pub struct ConjugateGradients {
     series: Option<Series>,
     /// Whether little gained ends an iteration too.
     in_energy: bool,
+    /// Whether matrices come by their diagonal blocks.
+    matrix_free: bool,
     r: Vec<Vec3>,
     z: Vec<Vec3>,
     p: Vec<Vec3>,
@@ -77,6 +79,7 @@ impl ConjugateGradients {
             limit: None,
             series: None,
             in_energy: false,
+            matrix_free: false,
             r: Vec::new(),
             z: Vec::new(),
             p: Vec::new(),
@@ -108,6 +111,13 @@ impl ConjugateGradients {
     #[must_use]
     pub fn in_energy(mut self) -> Self {
         self.in_energy = true;
+        self
+    }
+
+    /// The same that gets of matrices their diagonal blocks and products.
+    #[must_use]
+    pub fn matrix_free(mut self) -> Self {
+        self.matrix_free = true;
         self
     }
 
@@ -159,8 +169,25 @@ impl LinearSolver for ConjugateGradients {
         x: &mut [Vec3],
         tolerance: f64,
     ) -> Result<u32, LinearError> {
-        let n = matrix.n();
-        if [b.len(), x.len(), self.r.len()] != [n; 3] {
+        if matrix.n() != b.len() {
+            return Err(LinearError::NoConvergence);
+        }
+        self.solve_by(&mut |x, y| matrix.multiply(x, y), b, x, tolerance)
+    }
+
+    fn is_matrix_free(&self) -> bool {
+        self.matrix_free
+    }
+
+    fn solve_by(
+        &mut self,
+        product: Product<'_>,
+        b: &[Vec3],
+        x: &mut [Vec3],
+        tolerance: f64,
+    ) -> Result<u32, LinearError> {
+        let n = b.len();
+        if [x.len(), self.r.len()] != [n; 2] {
             return Err(LinearError::NoConvergence);
         }
         x.fill(Vec3::zeros());
@@ -183,7 +210,7 @@ impl LinearSolver for ConjugateGradients {
             .unwrap_or(500 + (60.0 * (3.0 * n as f64).sqrt()) as u32);
         let mut iterations = 0;
         for _ in 0..=RESTARTS {
-            let done = self.iterate(matrix, x, [goal, gained], limit, &mut iterations);
+            let done = self.iterate(product, x, [goal, gained], limit, &mut iterations);
             if let Some(keep) = self.series.as_ref().map(|s| s.keep) {
                 if iterations > keep {
                     self.discard();
@@ -196,7 +223,7 @@ impl LinearSolver for ConjugateGradients {
                 };
             }
             done?;
-            matrix.multiply(x, &mut self.q);
+            product(x, &mut self.q);
             for i in 0..n {
                 self.r[i] = b[i] - self.q[i];
             }
@@ -225,13 +252,13 @@ impl ConjugateGradients {
     /// gain the second as a part of the whole gain.
     fn iterate(
         &mut self,
-        matrix: &BlockMatrix,
+        product: Product<'_>,
         x: &mut [Vec3],
         [goal, gained]: [f64; 2],
         limit: u32,
         iterations: &mut u32,
     ) -> Result<(), LinearError> {
-        self.preconditioner.apply(matrix, &self.r, &mut self.z);
+        self.preconditioner.apply(product, &self.r, &mut self.z);
         self.p.copy_from_slice(&self.z);
         let mut rz = dot(&self.r, &self.z);
         let mut rr = dot(&self.r, &self.r);
@@ -241,7 +268,7 @@ impl ConjugateGradients {
                 return Err(LinearError::NoConvergence);
             }
             *iterations += 1;
-            matrix.multiply(&self.p, &mut self.q);
+            product(&self.p, &mut self.q);
             let curvature = dot(&self.p, &self.q);
             if curvature.is_nan() || rz.is_nan() {
                 return Err(LinearError::NoConvergence);
@@ -261,7 +288,7 @@ impl ConjugateGradients {
             }
             self.preconditioner.project(&mut self.r);
             rr = dot(&self.r, &self.r);
-            self.preconditioner.apply(matrix, &self.r, &mut self.z);
+            self.preconditioner.apply(product, &self.r, &mut self.z);
             let next = dot(&self.r, &self.z);
             let beta = next / rz;
             rz = next;

@@ -15,10 +15,10 @@
 //! factors, and with block Jacobi 1 400. The work grows with the number of unknowns and no faster; every part is a task of its own,
 //! and the sum over the parts has one order: results do not depend on threads.
 
-use super::LinearError;
 use super::cholesky::Cholesky;
 use super::graph::Graph;
 use super::pcg::Preconditioner;
+use super::{LinearError, Product};
 use crate::math::Vec3;
 use crate::math::block::{BlockMatrix, BlockPattern};
 use crate::math::parallel::Workers;
@@ -92,7 +92,7 @@ impl Preconditioner for Schwarz {
         self.first_error()
     }
 
-    fn apply(&mut self, _matrix: &BlockMatrix, r: &[Vec3], z: &mut [Vec3]) {
+    fn apply(&mut self, _product: Product<'_>, r: &[Vec3], z: &mut [Vec3]) {
         self.workers.chunks(&mut self.parts, 1, |_, parts| {
             for part in parts {
                 part.done = part.solve(r);
