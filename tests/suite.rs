@@ -75,6 +75,8 @@ mod licences;
 mod linear_solvers;
 #[path = "live_regions.rs"]
 mod live_regions;
+#[path = "matrix_free.rs"]
+mod matrix_free;
 #[path = "mixed_hard.rs"]
 mod mixed_hard;
 #[path = "mixed_patches.rs"]

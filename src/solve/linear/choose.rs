@@ -66,9 +66,6 @@ const KEPT: u32 = 15;
 /// The same of yarns, and of the factors of parts.
 const KEPT_YARNS: [u32; 2] = [6, 4];
 
-/// Iterations without a matrix after which a direction is taken as it is.
-const MATRIX_FREE: u32 = 2_000;
-
 /// What a system is made of, as far as its matrices show it.
 #[derive(Clone, Copy)]
 pub enum Made<'a> {
@@ -131,10 +128,7 @@ fn parted(workers: &Workers) -> ConjugateGradients {
 }
 
 fn matrix_free() -> ConjugateGradients {
-    ConjugateGradients::new(Box::new(BlockJacobi::new()))
-        .for_newton(0)
-        .with_limit(MATRIX_FREE)
-        .matrix_free()
+    ConjugateGradients::new(Box::new(BlockJacobi::new())).matrix_free()
 }
 
 fn incomplete(made: Made<'_>) -> ConjugateGradients {
