@@ -56,6 +56,22 @@ fn yarns_move_as_by_exact_factors() {
     compare(&knit("stockinette", 4));
 }
 
+/// Turned on and off while the simulation lives: matrix and motion are those of one that never had it.
+#[test]
+fn it_goes_without_a_matrix_and_back() {
+    let motion = |kinds: &[f64]| {
+        let mut sim = sim(&knit("stockinette", 4), -9.81, &[]);
+        for kind in kinds {
+            sim.set_number("solver.linear.kind", *kind).expect("kind");
+        }
+        for _ in 0..3 {
+            let _ = sim.step(1e-3).expect("step");
+        }
+        (points(&sim), sim.info().bytes)
+    };
+    assert_eq!(motion(&[]), motion(&[6.0, 0.0]));
+}
+
 /// Nodes that ride on triangles, and triangles.
 #[test]
 fn mixed_cloth_moves_as_by_exact_factors() {

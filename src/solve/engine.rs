@@ -112,7 +112,12 @@ impl Engine {
         }
         self.system.set_options(&settings.into())?;
         self.settings = settings.clone();
-        self.assembler = assembler(&self.system, self.linear.as_ref());
+        if self.linear.is_matrix_free() == self.assembler.is_of_diagonal() {
+            self.assembler
+                .rebuild(self.system.block_count(), &self.system.terms);
+        } else {
+            self.assembler = assembler(&self.system, self.linear.as_ref());
+        }
         Ok(())
     }
 

@@ -120,7 +120,7 @@ settings! {
     drape_max_steps: "solver.drape.max_steps" = 2000.0, 1.0, 1e7, "1" whole;
     /// Coarse levels used by a drape from the flat panels, 0 for none.
     drape_levels: "solver.drape.levels" = 1.0, 0.0, 4.0, "1" whole;
-    /// Linear solver: 0 chooses for each matrix, 1 sparse Cholesky, 2 conjugate gradients with block Jacobi, 3 with incomplete Cholesky, 4 with the Cholesky factor of an earlier matrix, 5 with those of overlapping parts, 6 conjugate gradients with block Jacobi and without the matrix, for memory: a drape does not prove that its rest is a minimum. With hybrid rings 0 and 1 are direct; 2 and 3 are conjugate gradients with diagonal blocks, 4 and 5 with factors of overlapping parts, both with the triangles as a second level; 6 counts as 2 there.
+    /// Linear solver: 0 chooses for each matrix, 1 sparse Cholesky, 2 conjugate gradients with block Jacobi, 3 with incomplete Cholesky, 4 with the Cholesky factor of an earlier matrix, 5 with those of overlapping parts, 6 conjugate gradients with block Jacobi and without the matrix, for memory and for motion: it is some hundred times as slow, and a drape does not prove that its rest is a minimum. With hybrid rings 0 and 1 are direct; 2 and 3 are conjugate gradients with diagonal blocks, 4 and 5 with factors of overlapping parts, both with the triangles as a second level; 6 counts as 2 there.
     linear_kind: "solver.linear.kind" = 0.0, 0.0, 6.0, "1" whole;
     /// Relative residual at which conjugate gradients stop.
     linear_tolerance: "solver.linear.tolerance" = 1e-3, 1e-14, 0.5, "1";

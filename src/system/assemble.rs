@@ -118,6 +118,11 @@ impl Assembler {
         self.spreads = spreads;
     }
 
+    /// Whether the matrix has its diagonal blocks alone.
+    pub fn is_of_diagonal(&self) -> bool {
+        self.diagonal
+    }
+
     /// The matrix last assembled.
     pub fn matrix(&self) -> &BlockMatrix {
         &self.matrix

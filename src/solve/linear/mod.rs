@@ -6,6 +6,7 @@
 //!   complete factor of an earlier matrix, of its stiff part) or [`schwarz`] (factors of overlapping parts of the [`graph`]).
 //! * [`constrained`]: the same with linear constraints between the unknowns, of blended rings;
 //!   [`filtered`] is a preconditioner under these.
+//!   A solver that [is matrix-free](LinearSolver::is_matrix_free) gets products in place of the matrix.
 //! * [`choose`]: which of them, by number or by measured crossover.
 
 mod cholesky;
