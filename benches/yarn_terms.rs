@@ -239,7 +239,7 @@ fn main() {
         for term in all {
             let name = term.name();
             let one = [term];
-            let mut assembler = Assembler::new(x.len(), &one, &Riders::default());
+            let mut assembler = Assembler::new(&vec![3; x.len()], &one, &Riders::default());
             assembler.add(&one, &at, Some(HessianKind::Psd), &workers, &mut gradient);
             const ROUNDS: u32 = 10;
             let from = cpu();

@@ -347,7 +347,7 @@ fn held_matrix(case: &Case, held: usize, numbers: &mut Numbers) -> (BlockMatrix,
     for v in case.filter().kept().iter().take(held) {
         fixed[*v as usize] = true;
     }
-    toile::system::assemble::fix_rows(&mut matrix, &fixed);
+    toile::system::assemble::fix_rows(&mut matrix, &fixed, &Workers::default());
     (matrix, fixed)
 }
 

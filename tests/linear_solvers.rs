@@ -100,6 +100,49 @@ fn every_solver_agrees_with_the_dense_solution() {
     }
 }
 
+/// Scalars of a block row that are no unknowns have the row of the identity, for every solver and in factors that are cut.
+#[test]
+fn scalars_that_are_no_unknowns_keep_the_right_hand_side() {
+    for (n, exact_only) in [(100, false), (6_000, true)] {
+        let mut case = sewn_cloth(n, 2, 3e-3);
+        let n = case.matrix.n();
+        let pattern = &mut case.matrix.pattern;
+        pattern.widths = (0..n).map(|i| 1 + (i * 7 % 3) as u8).collect();
+        for j in 0..n {
+            for k in pattern.starts[j] as usize..pattern.starts[j + 1] as usize {
+                let i = pattern.rows[k];
+                let (height, width) = (pattern.width(i), pattern.width(j as u32));
+                let block = &mut case.matrix.blocks[k];
+                *block = Mat3::from_fn(|r, c| {
+                    if r < usize::from(height) && c < usize::from(width) {
+                        block[(r, c)]
+                    } else {
+                        f64::from(u8::from(i as usize == j && r == c))
+                    }
+                });
+            }
+        }
+        let b = forces(n, 3);
+        for mut solver in all(&case.priorities) {
+            if exact_only && solver.name() != "cholesky" {
+                continue;
+            }
+            solver.prepare(&case.matrix).expect("prepares");
+            let mut x = vec![Vec3::repeat(f64::NAN); n];
+            solver
+                .solve(&case.matrix, &b, &mut x, 1e-12)
+                .expect("solves");
+            let left = residual(&case.matrix, &b, &x);
+            assert!(left < 1e-11, "{}: {left:e}", solver.name());
+            for (i, (x, b)) in x.iter().zip(&b).enumerate() {
+                for c in usize::from(case.matrix.pattern.widths[i])..3 {
+                    assert!((x[c] - b[c]).abs() < 1e-9, "{}", solver.name());
+                }
+            }
+        }
+    }
+}
+
 /// At a coarser tolerance the reported solution meets it, in the true residual.
 #[test]
 fn the_tolerance_holds_for_the_true_residual() {

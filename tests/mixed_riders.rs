@@ -62,6 +62,10 @@ impl Term for Quadratic {
         }
     }
 
+    fn bytes(&self) -> usize {
+        0
+    }
+
     fn value(&self, e: usize, at: &Configuration<'_>) -> f64 {
         let y = self.place(e, at.x);
         0.5 * y.dot(&(&self.matrices[e] * &y))
@@ -169,7 +173,7 @@ fn what_belongs_to_riders_goes_to_their_carriers_by_the_transpose() {
         world: &world,
     };
     let workers = Workers::new(1);
-    let mut assembler = Assembler::new(all, &terms, &riders);
+    let mut assembler = Assembler::new(&vec![3; all], &terms, &riders);
     let mut gradient = vec![Vec3::zeros(); all];
     assembler.add(
         &terms,
@@ -200,7 +204,7 @@ fn what_belongs_to_riders_goes_to_their_carriers_by_the_transpose() {
         workers: &workers,
     };
     let mut work = Vec::new();
-    let mut diagonal = Assembler::of_diagonal(all, &terms, &riders);
+    let mut diagonal = Assembler::of_diagonal(&vec![3; all], &terms, &riders);
     diagonal.add(
         &terms,
         &at,

@@ -6,6 +6,7 @@
 //! supernodal Cholesky wants comes without a sort.
 
 use super::{Mat3, Vec3};
+use std::ops::Range;
 
 /// Which blocks of a symmetric matrix exist.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -14,6 +15,9 @@ pub struct BlockPattern {
     pub starts: Vec<u32>,
     /// Block row of each stored block; `rows[starts[j]] == j`.
     pub rows: Vec<u32>,
+    /// How many scalars of each block row are unknowns, the first ones, 1 to 3; the others have the rows and columns of the identity. Empty
+    /// where all are.
+    pub widths: Vec<u8>,
 }
 
 impl Default for BlockPattern {
@@ -22,6 +26,7 @@ impl Default for BlockPattern {
         Self {
             starts: vec![0],
             rows: Vec::new(),
+            widths: Vec::new(),
         }
     }
 }
@@ -30,33 +35,62 @@ impl BlockPattern {
     /// Pattern of an `n` x `n` block matrix that couples the vertices of every stencil.
     /// `stencils` is called with a sink that takes one stencil (a list of block indices) a time.
     pub fn from_stencils(n: usize, stencils: impl Fn(&mut dyn FnMut(&[u32]))) -> Self {
-        let mut pairs: Vec<u64> = (0..n as u64).map(|j| j << 32 | j).collect();
-        stencils(&mut |s: &[u32]| {
-            for &a in s {
-                for &b in s {
-                    if a > b {
-                        pairs.push(u64::from(b) << 32 | u64::from(a));
+        // the rows of each column as often as they come, and then once
+        let each = |visit: &mut dyn FnMut(u32, u32)| {
+            stencils(&mut |s: &[u32]| {
+                for (k, &a) in s.iter().enumerate() {
+                    for &b in &s[..k] {
+                        if a != b {
+                            visit(a.max(b), a.min(b));
+                        }
                     }
                 }
-            }
-        });
-        pairs.sort_unstable();
-        pairs.dedup();
-        let mut starts = vec![0_u32; n + 1];
-        let mut rows = Vec::with_capacity(pairs.len());
-        for p in pairs {
-            starts[(p >> 32) as usize + 1] += 1;
-            rows.push(p as u32);
-        }
+            });
+        };
+        let mut ends = vec![0_usize; n + 1];
+        each(&mut |_, column| ends[column as usize + 1] += 1);
         for j in 0..n {
-            starts[j + 1] += starts[j];
+            ends[j + 1] += ends[j];
         }
-        Self { starts, rows }
+        let mut all = vec![0_u32; ends[n]];
+        each(&mut |row, column| {
+            all[ends[column as usize]] = row;
+            ends[column as usize] += 1;
+        });
+        let mut starts = Vec::with_capacity(n + 1);
+        let mut rows = Vec::with_capacity(n + all.len() / 4);
+        let mut column_of = vec![u32::MAX; n];
+        starts.push(0);
+        let mut from = 0;
+        for j in 0..n as u32 {
+            let first = rows.len();
+            rows.push(j);
+            for &row in &all[from..ends[j as usize]] {
+                if column_of[row as usize] != j {
+                    column_of[row as usize] = j;
+                    rows.push(row);
+                }
+            }
+            rows[first..].sort_unstable();
+            from = ends[j as usize];
+            starts.push(rows.len() as u32);
+        }
+        rows.shrink_to_fit();
+        Self {
+            starts,
+            rows,
+            widths: Vec::new(),
+        }
     }
 
     /// Number of block rows.
     pub fn n(&self) -> usize {
         self.starts.len() - 1
+    }
+
+    /// Unknown scalars of a block row.
+    pub fn width(&self, row: u32) -> u8 {
+        self.widths.get(row as usize).copied().unwrap_or(3)
     }
 
     /// Index of block `(i, j)`, `i >= j`, among the stored blocks.
@@ -98,19 +132,29 @@ impl BlockMatrix {
 
     /// `y += A x`.
     pub fn add_product(&self, x: &[Vec3], y: &mut [Vec3]) {
-        for j in 0..self.n() {
+        self.add_columns(0..self.n(), x, y);
+    }
+
+    /// Adds to `y` what the stored blocks of some columns and their transposes give; `x` and `y` begin with the row of the
+    /// first of them.
+    pub fn add_columns(&self, columns: Range<usize>, x: &[Vec3], y: &mut [Vec3]) {
+        let first = columns.start;
+        for j in columns {
             let (from, to) = (
                 self.pattern.starts[j] as usize,
                 self.pattern.starts[j + 1] as usize,
             );
-            let xj = x[j];
-            let mut yj = y[j] + self.blocks[from] * xj;
-            for k in from + 1..to {
-                let i = self.pattern.rows[k] as usize;
-                y[i] += self.blocks[k] * xj;
-                yj += self.blocks[k].tr_mul(&x[i]);
+            let xj = x[j - first];
+            let mut yj = y[j - first] + self.blocks[from] * xj;
+            for (row, block) in self.pattern.rows[from + 1..to]
+                .iter()
+                .zip(&self.blocks[from + 1..to])
+            {
+                let i = *row as usize - first;
+                y[i] += block * xj;
+                yj += block.tr_mul(&x[i]);
             }
-            y[j] = yj;
+            y[j - first] = yj;
         }
     }
 }

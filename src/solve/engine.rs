@@ -40,7 +40,6 @@ pub struct Engine {
     measure: Vec<f64>,
     center: Vec<Vec3>,
     fixed: Vec<bool>,
-    idle: Vec<(u32, u8)>,
     start: Vec<Vec3>,
     u: Vec<f64>,
     carry: Carry,
@@ -91,7 +90,6 @@ impl Engine {
             measure: Vec::new(),
             center: Vec::new(),
             fixed: Vec::new(),
-            idle: Vec::new(),
             start: Vec::new(),
             u: Vec::new(),
             carry: Carry::default(),
@@ -114,7 +112,7 @@ impl Engine {
         self.settings = settings.clone();
         if self.linear.is_matrix_free() == self.assembler.is_of_diagonal() {
             self.assembler
-                .rebuild(self.system.block_count(), &self.system.terms);
+                .rebuild(&self.system.widths(), &self.system.terms, &self.workers);
         } else {
             self.assembler = assembler(&self.system, self.linear.as_ref());
         }
@@ -129,7 +127,7 @@ impl Engine {
         };
         self.system.set_options(&options)?;
         self.assembler
-            .rebuild(self.system.block_count(), &self.system.terms);
+            .rebuild(&self.system.widths(), &self.system.terms, &self.workers);
         Ok(())
     }
 
@@ -137,7 +135,7 @@ impl Engine {
     pub fn take_contacts(&mut self, state: &State) -> Result<()> {
         if self.system.take_contacts(state)? {
             self.assembler
-                .rebuild(self.system.block_count(), &self.system.terms);
+                .rebuild(&self.system.widths(), &self.system.terms, &self.workers);
         }
         Ok(())
     }
@@ -152,9 +150,12 @@ impl Engine {
         self.linear.name()
     }
 
-    /// Bytes of the solver's factor and work arrays.
+    /// Bytes of the factor and of work arrays.
     pub fn factor_bytes(&self) -> usize {
-        self.linear.bytes() + self.direct.bytes()
+        let vectors = [&self.center, &self.start].map(|v| size_of_val(&v[..]));
+        let numbers = [&self.weight, &self.measure, &self.u].map(|v| size_of_val(&v[..]));
+        let own = vectors.iter().chain(&numbers).sum::<usize>() + self.work.bytes();
+        own + self.linear.bytes() + self.direct.bytes()
     }
 
     /// Whether there is a matrix to factor, and not its diagonal blocks alone.
@@ -223,7 +224,6 @@ impl Engine {
                 coupling.carry(&mut self.carry.way);
             }
         }
-        let n = x.len();
         let system = &mut self.system;
         let world = World {
             gravity: state.gravity,
@@ -244,7 +244,8 @@ impl Engine {
                 changed |= term.begin_step(state, &at);
             }
             if changed {
-                self.assembler.rebuild(n, &system.terms);
+                self.assembler
+                    .rebuild(&system.widths(), &system.terms, &self.workers);
             }
         }
         let problem = Problem {
@@ -260,7 +261,6 @@ impl Engine {
             },
             fixed: &self.fixed,
             coupling: &system.points.coupling,
-            idle: &self.idle,
             workers: &self.workers,
         };
         let mut tolerance = Tolerance {
@@ -408,7 +408,8 @@ impl Engine {
         if !matches!(motion, Motion::Relax { follow: false, .. }) {
             // the forces of a relaxation are not those of a motion: yarns come out of contacts in time only
             if system.follow_contacts(dynamic, state, &self.workers)? {
-                self.assembler.rebuild(system.block_count(), &system.terms);
+                self.assembler
+                    .rebuild(&system.widths(), &system.terms, &self.workers);
             }
         }
         system.bodies.accept(state);
@@ -428,7 +429,6 @@ impl Engine {
         self.center.clone_from(&self.start);
         self.fixed.clear();
         self.fixed.resize(n, false);
-        self.idle.clear();
         for i in 0..points.count() {
             let alpha = if dynamic { points.damping[i] } else { 0.0 };
             self.measure[i] = points.masses[i] * (1.0 / (h * h) + alpha / h);
@@ -464,8 +464,6 @@ impl Engine {
             if !dynamic {
                 self.weight[block] = self.measure[block];
             }
-            self.idle
-                .extend((unknowns.used[k]..3).map(|c| (block as u32, c)));
         }
         if !dynamic {
             for (i, slot) in unknowns.slides.iter().enumerate() {
@@ -496,11 +494,11 @@ fn go_on(system: &System, state: &State, h: f64, fixed: &[bool], x: &mut [Vec3])
 
 /// What the linear solver wants of matrices.
 fn assembler(system: &System, linear: &dyn LinearSolver) -> Assembler {
-    let (n, riders) = (system.block_count(), &system.points.coupling.riders);
+    let riders = &system.points.coupling.riders;
     if linear.is_matrix_free() {
-        Assembler::of_diagonal(n, &system.terms, riders)
+        Assembler::of_diagonal(&system.widths(), &system.terms, riders)
     } else {
-        Assembler::new(n, &system.terms, riders)
+        Assembler::new(&system.widths(), &system.terms, riders)
     }
 }
 

@@ -20,6 +20,7 @@ use super::pace::ALMOST;
 use crate::math::block::{BlockMatrix, BlockPattern};
 use crate::math::parallel::Workers;
 use crate::math::{Mat3, Vec3};
+use crate::system::assemble::complete;
 use crate::system::term::{HessianKind, MAX_ARITY, MAX_BLOCKS, Term};
 
 /// Part of the energy left that may stay outside.
@@ -56,6 +57,8 @@ struct Group {
 /// Groups of one task, with positions of all blocks and the place of each in its group.
 struct Task {
     groups: Vec<Group>,
+    /// Blocks of them all.
+    work: usize,
     x: Vec<Vec3>,
     place: Vec<u32>,
 }
@@ -64,6 +67,11 @@ impl Local {
     /// Forgets which stencils there are.
     pub(super) fn forget(&mut self) {
         self.starts.clear();
+    }
+
+    /// Bytes held.
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(&self.starts[..]) + size_of_val(&self.stencils[..])
     }
 
     fn know(&mut self, terms: &[Box<dyn Term>], n: usize) {
@@ -114,21 +122,30 @@ impl Local {
             self.know(problem.terms, n);
         }
         let mut place = vec![NOWHERE; n];
-        let mut groups = self.groups(problem, worst, &mut place).into_iter();
-        let count = problem.workers.count();
-        let share = groups.len().div_ceil(count).max(1);
-        let mut tasks = Vec::with_capacity(count);
-        while groups.len() > 0 {
-            tasks.push(Task {
-                groups: groups.by_ref().take(share).collect(),
-                x: x.to_vec(),
-                place: place.clone(),
-            });
+        let mut groups = self.groups(problem, worst, &mut place);
+        // the largest first, each to the task with the least work
+        groups.sort_by_key(|group| std::cmp::Reverse(group.blocks.len()));
+        let count = problem.workers.count().min(groups.len());
+        let task = || Task {
+            groups: Vec::new(),
+            work: 0,
+            x: x.to_vec(),
+            place: place.clone(),
+        };
+        let mut tasks: Vec<Task> = std::iter::repeat_with(task).take(count).collect();
+        for group in groups {
+            if let Some(task) = tasks.iter_mut().min_by_key(|task| task.work) {
+                task.work += group.blocks.len();
+                task.groups.push(group);
+            }
         }
         problem.workers.chunks(&mut tasks, 1, |_, tasks| {
-            for Task { groups, x, place } in tasks {
+            for Task {
+                groups, x, place, ..
+            } in tasks
+            {
                 for group in groups {
-                    group.minimise(problem, place, x);
+                    group.minimise(problem, &matrix.pattern, place, x);
                 }
             }
         });
@@ -301,29 +318,35 @@ impl Group {
                 }
             }
         }
-        for (block, c) in problem.idle {
-            let k = place[*block as usize];
-            if k != NOWHERE {
-                let slot = matrix.pattern.starts[k as usize] as usize;
-                matrix.blocks[slot][(usize::from(*c), usize::from(*c))] = 1.0;
-            }
-        }
+        complete(matrix);
     }
 
     /// Newton's method by the blocks of the group; `place` is [`NOWHERE`] at every block, before and after.
-    fn minimise(&self, problem: &Problem<'_>, place: &mut [u32], x: &mut [Vec3]) {
+    fn minimise(
+        &self,
+        problem: &Problem<'_>,
+        whole: &BlockPattern,
+        place: &mut [u32],
+        x: &mut [Vec3],
+    ) {
         for (k, b) in self.blocks.iter().enumerate() {
             place[*b as usize] = k as u32;
         }
-        self.corrections(problem, place, x);
+        self.corrections(problem, whole, place, x);
         for b in &self.blocks {
             place[*b as usize] = NOWHERE;
         }
     }
 
-    fn corrections(&self, problem: &Problem<'_>, place: &[u32], x: &mut [Vec3]) {
+    fn corrections(
+        &self,
+        problem: &Problem<'_>,
+        whole: &BlockPattern,
+        place: &[u32],
+        x: &mut [Vec3],
+    ) {
         let n = self.blocks.len();
-        let pattern = BlockPattern::from_stencils(n, |sink| {
+        let mut pattern = BlockPattern::from_stencils(n, |sink| {
             let mut inside = Vec::new();
             for (t, e) in &self.stencils {
                 let stencils = problem.terms[usize::from(*t)].stencils();
@@ -333,6 +356,9 @@ impl Group {
                 sink(&inside);
             }
         });
+        if !whole.widths.is_empty() {
+            pattern.widths = self.blocks.iter().map(|b| whole.width(*b)).collect();
+        }
         let mut matrix = BlockMatrix::zeros(pattern);
         let mut solver = Direct::new(&Workers::default());
         let zeros = vec![Vec3::zeros(); n];

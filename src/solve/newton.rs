@@ -11,10 +11,10 @@ use super::linear::{LinearError, LinearSolver};
 use super::local::Local;
 use crate::blend::Coupling;
 use crate::error::{Error, Result, Status};
-use crate::math::Vec3;
 use crate::math::block::BlockMatrix;
 use crate::math::parallel::Workers;
-use crate::system::assemble::{Assembler, Products, energy, fix_rows};
+use crate::math::{Mat3, Vec3};
+use crate::system::assemble::{Assembler, Products, complete, energy, fix_rows};
 use crate::system::term::{Configuration, HessianKind, Term, World};
 
 /// The quadratic part of the incremental potential.
@@ -109,8 +109,6 @@ pub struct Problem<'a> {
     pub fixed: &'a [bool],
     /// What joins points to each other.
     pub coupling: &'a Coupling,
-    /// Block and component of entries that nothing depends on.
-    pub idle: &'a [(u32, u8)],
     /// Threads.
     pub workers: &'a Workers,
 }
@@ -130,6 +128,19 @@ pub struct Work {
 }
 
 impl Work {
+    /// Bytes held.
+    pub(super) fn bytes(&self) -> usize {
+        let vectors = [
+            &self.gradient,
+            &self.gathered,
+            &self.negative,
+            &self.direction,
+            &self.trial,
+            &self.products,
+        ];
+        vectors.map(|v| size_of_val(&v[..])).iter().sum::<usize>() + self.local.bytes()
+    }
+
     fn resize(&mut self, n: usize) {
         for v in [
             &mut self.gradient,
@@ -215,9 +226,9 @@ impl Problem<'_> {
         } = work;
         gradient.fill(Vec3::zeros());
         let matrix: &mut BlockMatrix = assembler.matrix_mut();
-        for block in &mut matrix.blocks {
-            block.fill(0.0);
-        }
+        self.workers.chunks(&mut matrix.blocks, 4_096, |_, blocks| {
+            blocks.fill(Mat3::zeros());
+        });
         for (i, w) in self.inertia.weight.iter().enumerate() {
             let slot = matrix.pattern.starts[i] as usize;
             for d in 0..3 {
@@ -229,12 +240,8 @@ impl Problem<'_> {
             assembler.matrix().add_product(way, gradient);
         }
         let matrix = assembler.matrix_mut();
-        fix_rows(matrix, self.fixed);
-        for (block, c) in self.idle {
-            let slot = matrix.pattern.starts[*block as usize] as usize;
-            let c = usize::from(*c);
-            matrix.blocks[slot][(c, c)] = 1.0;
-        }
+        fix_rows(matrix, self.fixed, self.workers);
+        complete(matrix);
         for (g, fixed) in gradient.iter_mut().zip(self.fixed) {
             if *fixed {
                 g.fill(0.0);
@@ -254,8 +261,8 @@ impl Problem<'_> {
         &self,
         x: &[Vec3],
         kind: HessianKind,
-        p: &[Vec3],
-        y: &mut [Vec3],
+        widths: &[u8],
+        (p, y): (&[Vec3], &mut [Vec3]),
         work: &mut Vec<Vec3>,
     ) {
         for ((y, p), w) in y.iter_mut().zip(p).zip(self.inertia.weight) {
@@ -270,9 +277,10 @@ impl Problem<'_> {
         };
         // what is fixed has zeros in `p`
         products.add(p, y, work);
-        for (block, c) in self.idle {
-            let (block, c) = (*block as usize, usize::from(*c));
-            y[block][c] = p[block][c];
+        for ((y, p), width) in y.iter_mut().zip(p).zip(widths) {
+            for c in usize::from(*width)..3 {
+                y[c] = p[c];
+            }
         }
         for ((y, p), fixed) in y.iter_mut().zip(p).zip(self.fixed) {
             if *fixed {
@@ -419,8 +427,9 @@ impl Problem<'_> {
                 } = work;
                 let solved = prepared.and_then(|()| {
                     if linear.is_matrix_free() {
-                        let mut product =
-                            |p: &[Vec3], y: &mut [Vec3]| self.times(x, kind, p, y, products);
+                        let mut product = |p: &[Vec3], y: &mut [Vec3]| {
+                            self.times(x, kind, &matrix.pattern.widths, (p, y), products);
+                        };
                         linear.solve_by(&mut product, negative, direction, tolerance.linear)
                     } else {
                         linear.solve(matrix, negative, direction, tolerance.linear)

@@ -80,6 +80,10 @@ impl Term for Air {
         }
     }
 
+    fn bytes(&self) -> usize {
+        size_of_val(&self.vertices[..]) + size_of_val(&self.own[..])
+    }
+
     fn value(&self, e: usize, at: &Configuration<'_>) -> f64 {
         let Some(f) = self.flow(e, at) else {
             return 0.0;

@@ -12,15 +12,28 @@ use crate::math::parallel::Workers;
 use crate::math::{Mat3, Vec3};
 
 /// Blocks evaluated between two scatters.
-const BATCH_BLOCKS: usize = 40_960;
+const BATCH_BLOCKS: usize = 32_768;
 /// Stencils of one parallel task.
-const CHUNK: usize = 128;
+const CHUNK: usize = 64;
+/// Blocks of one task that looks for fixed rows.
+const FIXED: usize = 4_096;
+/// Ranges of slots for each thread.
+const RANGES: usize = 2;
+/// Blocks of a batch below which one thread adds them.
+const FEW: usize = 2_048;
 /// Set in a slot when the stored block is the transpose of the stencil's block.
 const TRANSPOSED: u32 = 1 << 31;
-/// Set in an entry of a plan that is a number of a spread instead of a slot.
-const SPREAD: u32 = 1 << 30;
-/// An entry of a plan for a block that is not in the matrix.
-const NOWHERE: u32 = SPREAD - 1;
+
+/// Where the lower blocks of a batch of stencils go.
+#[derive(Debug, Default)]
+struct Plan {
+    /// Slots, ascending, of those that go to one.
+    slots: Vec<u32>,
+    /// Which block of the batch goes to each.
+    blocks: Vec<u16>,
+    /// Blocks with riders, with their spreads.
+    spreads: Vec<(u16, u32)>,
+}
 
 /// One of the blocks that a block with a rider goes to.
 #[derive(Clone, Copy, Debug)]
@@ -44,8 +57,8 @@ struct Spreads {
 #[derive(Debug)]
 pub struct Assembler {
     matrix: BlockMatrix,
-    /// Per term, per stencil: slots of its lower blocks.
-    plans: Vec<Vec<u32>>,
+    /// Per term, per batch of stencils.
+    plans: Vec<Vec<Plan>>,
     spreads: Spreads,
     riders: Riders,
     /// Whether the matrix has its diagonal blocks alone.
@@ -55,35 +68,35 @@ pub struct Assembler {
 }
 
 impl Assembler {
-    /// Pattern and plans for the present stencils of the terms.
-    pub fn new(vertex_count: usize, terms: &[Box<dyn Term>], riders: &Riders) -> Self {
-        Self::of(vertex_count, terms, riders, false)
+    /// Pattern and plans for the present stencils of the terms; `widths` has the unknown scalars of each block.
+    pub fn new(widths: &[u8], terms: &[Box<dyn Term>], riders: &Riders) -> Self {
+        Self::of(widths, terms, riders, false)
     }
 
     /// The same of the diagonal blocks alone.
-    pub fn of_diagonal(vertex_count: usize, terms: &[Box<dyn Term>], riders: &Riders) -> Self {
-        Self::of(vertex_count, terms, riders, true)
+    pub fn of_diagonal(widths: &[u8], terms: &[Box<dyn Term>], riders: &Riders) -> Self {
+        Self::of(widths, terms, riders, true)
     }
 
-    fn of(vertex_count: usize, terms: &[Box<dyn Term>], riders: &Riders, diagonal: bool) -> Self {
+    fn of(widths: &[u8], terms: &[Box<dyn Term>], riders: &Riders, diagonal: bool) -> Self {
         let mut assembler = Self {
             matrix: BlockMatrix::zeros(BlockPattern::from_stencils(0, |_| {})),
             plans: Vec::new(),
             spreads: Spreads::default(),
             riders: riders.clone(),
             diagonal,
-            gradients: vec![Vec3::zeros(); BATCH_BLOCKS],
-            blocks: vec![Mat3::zeros(); BATCH_BLOCKS],
+            gradients: Vec::new(),
+            blocks: Vec::new(),
         };
-        assembler.rebuild(vertex_count, terms);
+        assembler.rebuild(widths, terms, &Workers::default());
         assembler
     }
 
     /// Takes changed stencils. The pattern changes only where a new coupling asks for it.
-    pub fn rebuild(&mut self, vertex_count: usize, terms: &[Box<dyn Term>]) {
+    pub fn rebuild(&mut self, widths: &[u8], terms: &[Box<dyn Term>], workers: &Workers) {
         let riders = &self.riders;
         let diagonal = self.diagonal;
-        let pattern = BlockPattern::from_stencils(vertex_count, |sink| {
+        let mut pattern = BlockPattern::from_stencils(widths.len(), |sink| {
             if diagonal {
                 return;
             }
@@ -104,6 +117,9 @@ impl Assembler {
                 }
             }
         });
+        if widths.iter().any(|w| *w < 3) {
+            pattern.widths = widths.to_vec();
+        }
         if pattern != self.matrix.pattern {
             self.matrix = BlockMatrix::zeros(pattern);
         }
@@ -113,9 +129,26 @@ impl Assembler {
         };
         self.plans = terms
             .iter()
-            .map(|t| plan(&self.matrix.pattern, t.as_ref(), riders, &mut spreads))
+            .map(|t| {
+                plans(
+                    &self.matrix.pattern,
+                    t.as_ref(),
+                    riders,
+                    &mut spreads,
+                    workers,
+                )
+            })
             .collect();
         self.spreads = spreads;
+        let (mut gradients, mut blocks) = (0, 0);
+        for stencils in terms.iter().map(|term| term.stencils()) {
+            let (arity, own) = (stencils.arity, stencils.arity * (stencils.arity + 1) / 2);
+            let batch = stencils.count().min(BATCH_BLOCKS / own.max(1));
+            gradients = gradients.max(batch * arity);
+            blocks = blocks.max(batch * own);
+        }
+        self.gradients.resize(gradients, Vec3::zeros());
+        self.blocks.resize(blocks, Mat3::zeros());
     }
 
     /// Whether the matrix has its diagonal blocks alone.
@@ -135,7 +168,10 @@ impl Assembler {
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        self.plans.iter().map(|p| p.len() * 4).sum::<usize>()
+        let plans = self.plans.iter().flatten();
+        plans
+            .map(|p| 6 * p.slots.len() + 8 * p.spreads.len())
+            .sum::<usize>()
             + self.spreads.starts.len() * 4
             + self.spreads.shares.len() * size_of::<Share>()
             + size_of_val(&self.spreads.turns[..])
@@ -160,8 +196,8 @@ impl Assembler {
                 continue;
             }
             let block_count = arity * (arity + 1) / 2;
-            let largest = (BATCH_BLOCKS / block_count).max(1);
-            for first in (0..count).step_by(largest) {
+            let largest = BATCH_BLOCKS / block_count;
+            for (first, plan) in (0..count).step_by(largest).zip(&self.plans[t]) {
                 let batch = largest.min(count - first);
                 let kind = hessian.filter(|kind| term.has_hessian(*kind));
                 let gradients = &mut self.gradients[..batch * arity];
@@ -189,22 +225,10 @@ impl Assembler {
                 if kind.is_none() {
                     continue;
                 }
-                let slots = &self.plans[t][first * block_count..(first + batch) * block_count];
-                for (slot, block) in slots.iter().zip(&self.blocks) {
-                    if *slot == NOWHERE {
-                        continue;
-                    }
-                    if slot & SPREAD != 0 {
-                        self.spreads
-                            .add((slot & !SPREAD) as usize, block, &mut self.matrix);
-                        continue;
-                    }
-                    let target = &mut self.matrix.blocks[(slot & !TRANSPOSED) as usize];
-                    if slot & TRANSPOSED == 0 {
-                        *target += block;
-                    } else {
-                        *target += block.transpose();
-                    }
+                plan.scatter(&self.blocks, &mut self.matrix.blocks, workers);
+                for (block, spread) in &plan.spreads {
+                    let block = &self.blocks[usize::from(*block)];
+                    self.spreads.add(*spread as usize, block, &mut self.matrix);
                 }
             }
         }
@@ -236,7 +260,6 @@ impl Products<'_> {
                 self.riders.turn(point).map_or(place, |q| q * place)
             }
         };
-        work.resize(BATCH_BLOCKS, Vec3::zeros());
         for term in self.terms {
             let stencils = term.stencils();
             let (count, arity) = (stencils.count(), stencils.arity);
@@ -245,7 +268,11 @@ impl Products<'_> {
             }
             let largest = BATCH_BLOCKS / arity;
             for first in (0..count).step_by(largest) {
-                let products = &mut work[..largest.min(count - first) * arity];
+                let length = largest.min(count - first) * arity;
+                if work.len() < length {
+                    work.resize(length, Vec3::zeros());
+                }
+                let products = &mut work[..length];
                 self.workers.chunks(products, CHUNK * arity, |c, chunk| {
                     let mut blocks = [Mat3::zeros(); MAX_BLOCKS];
                     let blocks = &mut blocks[..arity * (arity + 1) / 2];
@@ -356,50 +383,127 @@ impl Spreads {
     }
 }
 
-fn plan(
+impl Plan {
+    /// Adds the blocks of the batch to those of the matrix, ranges of slots side by side; those of one slot come in the order of
+    /// the batch.
+    fn scatter(&self, blocks: &[Mat3], targets: &mut [Mat3], workers: &Workers) {
+        let slot = |k: usize| (self.slots[k] & !TRANSPOSED) as usize;
+        let count = match workers.count() {
+            1 => 1,
+            _ if self.slots.len() < FEW => 1,
+            threads => RANGES * threads,
+        };
+        let mut tasks = Vec::with_capacity(count);
+        let (mut rest, mut at, mut from) = (targets, 0, 0);
+        for c in 1..=count {
+            let mut to = self.slots.len() * c / count;
+            while to > from && to < self.slots.len() && slot(to - 1) == slot(to) {
+                to += 1;
+            }
+            if to <= from {
+                continue;
+            }
+            let end = slot(to - 1) + 1;
+            let (own, after) = std::mem::take(&mut rest).split_at_mut(end - at);
+            tasks.push((from..to, at, own));
+            (rest, at, from) = (after, end, to);
+        }
+        workers.chunks(&mut tasks, 1, |_, tasks| {
+            for (entries, first, targets) in tasks {
+                let slots = &self.slots[entries.clone()];
+                for (slot, block) in slots.iter().zip(&self.blocks[entries.clone()]) {
+                    let block = &blocks[usize::from(*block)];
+                    let target = &mut targets[(slot & !TRANSPOSED) as usize - *first];
+                    if slot & TRANSPOSED == 0 {
+                        *target += block;
+                    } else {
+                        *target += block.transpose();
+                    }
+                }
+            }
+        });
+    }
+}
+
+/// Plans of the batches of a term, side by side.
+fn plans(
     pattern: &BlockPattern,
     term: &dyn Term,
     riders: &Riders,
     spreads: &mut Spreads,
-) -> Vec<u32> {
+    workers: &Workers,
+) -> Vec<Plan> {
     let stencils = term.stencils();
-    let mut slots =
-        Vec::with_capacity(stencils.count() * stencils.arity * (stencils.arity + 1) / 2);
-    for e in 0..stencils.count() {
-        let vertices = stencils.get(e);
-        for (a, &i) in vertices.iter().enumerate() {
-            for &j in &vertices[..=a] {
-                if riders.rides(i) || riders.rides(j) {
-                    slots.push(spreads.plan(pattern, riders, i, j) | SPREAD);
-                    continue;
+    let (count, arity) = (stencils.count(), stencils.arity);
+    if count == 0 {
+        return Vec::new();
+    }
+    let largest = BATCH_BLOCKS / (arity * (arity + 1) / 2);
+    let mut out = Vec::new();
+    out.resize_with(count.div_ceil(largest), || (Plan::default(), Vec::new()));
+    workers.chunks(&mut out, 1, |c, out| {
+        for (plan, ridden) in out {
+            let mut entries = Vec::new();
+            let mut block = 0_u16;
+            for e in c * largest..((c + 1) * largest).min(count) {
+                let points = stencils.get(e);
+                for (a, &i) in points.iter().enumerate() {
+                    for &j in &points[..=a] {
+                        if riders.rides(i) || riders.rides(j) {
+                            ridden.push((block, i, j));
+                        } else if let Some(slot) = pattern.slot(i.max(j), i.min(j)) {
+                            let turned = u64::from(i < j);
+                            entries.push((slot as u64) << 32 | u64::from(block) << 1 | turned);
+                        }
+                        block += 1;
+                    }
                 }
-                slots.push(match pattern.slot(i.max(j), i.min(j)) {
-                    None => NOWHERE,
-                    Some(slot) if i >= j => slot as u32,
-                    Some(slot) => slot as u32 | TRANSPOSED,
-                });
             }
+            entries.sort_unstable();
+            plan.blocks = entries.iter().map(|entry| (entry >> 1) as u16).collect();
+            let slot = |entry: &u64| (entry >> 32) as u32 | (*entry as u32 & 1) << 31;
+            plan.slots = entries.iter().map(slot).collect();
+        }
+    });
+    let plan = |(mut plan, ridden): (Plan, Vec<(u16, u32, u32)>)| {
+        let spread = |(block, i, j)| (block, spreads.plan(pattern, riders, i, j));
+        plan.spreads = ridden.into_iter().map(spread).collect();
+        plan
+    };
+    out.into_iter().map(plan).collect()
+}
+
+/// Gives what is no unknown of a block row the row of the identity.
+pub fn complete(matrix: &mut BlockMatrix) {
+    for (j, width) in matrix.pattern.widths.iter().enumerate() {
+        let block = &mut matrix.blocks[matrix.pattern.starts[j] as usize];
+        for c in usize::from(*width)..3 {
+            block[(c, c)] = 1.0;
         }
     }
-    slots
 }
 
 /// Makes pinned vertices keep their place: their rows and columns become the identity.
-pub fn fix_rows(matrix: &mut BlockMatrix, fixed: &[bool]) {
-    for j in 0..matrix.n() {
-        let (from, to) = (
-            matrix.pattern.starts[j] as usize,
-            matrix.pattern.starts[j + 1] as usize,
-        );
-        for k in from..to {
-            let i = matrix.pattern.rows[k] as usize;
-            if fixed[i] || fixed[j] {
-                matrix.blocks[k] = if i == j {
+pub fn fix_rows(matrix: &mut BlockMatrix, fixed: &[bool], workers: &Workers) {
+    if !fixed.contains(&true) {
+        return;
+    }
+    let pattern = &matrix.pattern;
+    workers.chunks(&mut matrix.blocks, FIXED, |c, blocks| {
+        let first = c * FIXED;
+        let mut column = pattern.starts.partition_point(|s| *s as usize <= first) - 1;
+        for (k, block) in (first..).zip(blocks) {
+            while pattern.starts[column + 1] as usize <= k {
+                column += 1;
+            }
+            let row = pattern.rows[k] as usize;
+            if fixed[row] || fixed[column] {
+                *block = if row == column {
                     Mat3::identity()
                 } else {
                     Mat3::zeros()
                 };
             }
         }
-    }
+    });
 }

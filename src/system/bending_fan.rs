@@ -106,6 +106,13 @@ pub(super) struct FanGroup {
     pub(super) fans: Vec<FanRest>,
 }
 
+impl FanGroup {
+    /// Bytes held.
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(&self.vertices[..]) + size_of_val(&self.fans[..])
+    }
+}
+
 /// Rigidity of the three components of a moment: `tr(r M r) = d . (r11^2, 2 r12^2, r22^2)`.
 pub(super) fn rigidity(f: &Fabric) -> Vec3 {
     Vec3::new(

@@ -151,6 +151,13 @@ impl System {
         self.points.count() + self.unknowns.slide_blocks()
     }
 
+    /// Unknown scalars of each block, the first ones.
+    pub fn widths(&self) -> Vec<u8> {
+        let mut widths = vec![3; self.points.count()];
+        widths.extend(&self.unknowns.used);
+        widths
+    }
+
     /// Takes the contacts that a state's yarns are in and where they slide; true if unknowns have come or gone.
     pub fn take_contacts(&mut self, state: &State) -> Result<bool> {
         match &self.laid {
@@ -240,10 +247,14 @@ impl System {
         }
     }
 
-    /// Bytes of the mesh and of the rest data, terms not counted.
+    /// Bytes of the mesh, of the rest data and of the terms.
     pub fn bytes(&self) -> usize {
         let n = self.cloth.mesh.uv.len();
-        n * (16 + 24 + 4 + 8 + 8 + 8) + self.cloth.mesh.triangles.len() * 24 + self.edges.len() * 16
+        let terms: usize = self.terms.iter().map(|term| term.bytes()).sum();
+        terms
+            + n * (16 + 24 + 4 + 8 + 8 + 8)
+            + self.cloth.mesh.triangles.len() * 24
+            + self.edges.len() * 16
     }
 
     /// How deep a vertex may be in a body after an accepted substep [m].

@@ -62,6 +62,10 @@ impl Term for Gravity {
         }
     }
 
+    fn bytes(&self) -> usize {
+        size_of_val(&self.vertices[..]) + size_of_val(&self.elements[..])
+    }
+
     fn value(&self, e: usize, at: &Configuration<'_>) -> f64 {
         let element = &self.elements[e];
         let v = &self.vertices[3 * e..3 * e + 3];

@@ -161,6 +161,10 @@ impl Term for Hinge {
         }
     }
 
+    fn bytes(&self) -> usize {
+        self.group.bytes()
+    }
+
     fn value(&self, e: usize, at: &Configuration<'_>) -> f64 {
         let fan = &self.group.fans[e];
         let rate = fan.damping * at.inv_dt;

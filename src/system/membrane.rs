@@ -198,6 +198,10 @@ impl Term for Membrane {
         }
     }
 
+    fn bytes(&self) -> usize {
+        size_of_val(&self.vertices[..]) + size_of_val(&self.elements[..])
+    }
+
     fn value(&self, e: usize, at: &Configuration<'_>) -> f64 {
         let element = &self.elements[e];
         let (now, since, _) = self.state(e, &self.deformation(e, at.x), at);

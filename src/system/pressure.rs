@@ -53,6 +53,10 @@ impl Term for Pressure {
         }
     }
 
+    fn bytes(&self) -> usize {
+        size_of_val(&self.vertices[..]) + size_of_val(&self.own[..])
+    }
+
     fn value(&self, e: usize, at: &Configuration<'_>) -> f64 {
         let moved: Vec3 = self.vertices[3 * e..3 * e + 3]
             .iter()

@@ -85,6 +85,10 @@ impl Term for QuadraticBending {
         }
     }
 
+    fn bytes(&self) -> usize {
+        self.group.bytes() + size_of_val(&self.stiffness[..])
+    }
+
     fn value(&self, e: usize, at: &Configuration<'_>) -> f64 {
         let fan = &self.group.fans[e];
         let energy = |r: &Mat3| 0.5 * r.dot(&(fan.stiffness * r));

@@ -109,6 +109,10 @@ impl Term for SeamSprings {
         }
     }
 
+    fn bytes(&self) -> usize {
+        size_of_val(&self.vertices[..]) + size_of_val(&self.links[..])
+    }
+
     fn value(&self, e: usize, at: &Configuration<'_>) -> f64 {
         let k = self.links[e].stiffness;
         let g = gap(self.link(e), self.links[e].t, at.x).norm();
@@ -335,6 +339,10 @@ impl Term for SeamHinge {
             arity: 4,
             vertices: &self.vertices,
         }
+    }
+
+    fn bytes(&self) -> usize {
+        size_of_val(&self.vertices[..]) + size_of_val(&self.hinges[..])
     }
 
     fn value(&self, e: usize, at: &Configuration<'_>) -> f64 {

@@ -139,6 +139,8 @@ pub trait Term: Send + Sync {
     fn name(&self) -> &'static str;
     /// Its stencils, known at build (contacts: after `begin_step`).
     fn stencils(&self) -> Stencils<'_>;
+    /// Bytes of what it holds for its stencils.
+    fn bytes(&self) -> usize;
     /// Energy of one stencil [J].
     fn value(&self, e: usize, at: &Configuration<'_>) -> f64;
     /// Its derivative by the stencil's positions [N].

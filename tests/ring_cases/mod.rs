@@ -13,7 +13,7 @@ use toile::math::block::BlockMatrix;
 use toile::math::parallel::Workers;
 use toile::pattern::import::garment_from_json;
 use toile::sim::{ContactSettings, Settings};
-use toile::system::assemble::{Assembler, fix_rows};
+use toile::system::assemble::{Assembler, complete, fix_rows};
 use toile::system::bodies::BodySet;
 use toile::system::build::{BuildOptions, System};
 use toile::system::state::State;
@@ -171,7 +171,11 @@ pub(crate) fn case(side: f64, ratio: f64, [low, high]: [f64; 2], h: f64, yarning
     }
     let n = system.block_count();
     let workers = Workers::new(1);
-    let mut assembler = Assembler::new(n, &system.terms, &system.points.coupling.riders);
+    let mut assembler = Assembler::new(
+        &system.widths(),
+        &system.terms,
+        &system.points.coupling.riders,
+    );
     for v in 0..system.points.vertex_count {
         let matrix = assembler.matrix_mut();
         let slot = matrix.pattern.starts[v] as usize;
@@ -195,14 +199,8 @@ pub(crate) fn case(side: f64, ratio: f64, [low, high]: [f64; 2], h: f64, yarning
         fixed[v] |= p.y > side - 1e-9 && (p.x < 1e-9 || p.x > side - 1e-9);
     }
     let matrix = assembler.matrix_mut();
-    fix_rows(matrix, &fixed);
-    let unknowns = &system.unknowns;
-    for (k, used) in unknowns.used.iter().enumerate() {
-        let slot = matrix.pattern.starts[unknowns.first_slide as usize + k] as usize;
-        for c in usize::from(*used)..3 {
-            matrix.blocks[slot][(c, c)] = 1.0;
-        }
-    }
+    fix_rows(matrix, &fixed, &workers);
+    complete(matrix);
     let right = (gradient.iter().zip(&fixed))
         .map(|(g, fixed)| if *fixed { Vec3::zeros() } else { -g })
         .collect();

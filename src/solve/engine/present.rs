@@ -32,7 +32,6 @@ impl Engine {
                 },
                 fixed: &engine.fixed,
                 coupling: &engine.system.points.coupling,
-                idle: &engine.idle,
                 workers: &engine.workers,
             };
             problem.is_convex(
@@ -132,7 +131,8 @@ impl Engine {
             changed |= term.begin_step(state, &at);
         }
         if changed {
-            self.assembler.rebuild(x.len(), &self.system.terms);
+            self.assembler
+                .rebuild(&self.system.widths(), &self.system.terms, &self.workers);
         }
         Ok(f(self, &at))
     }

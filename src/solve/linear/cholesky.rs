@@ -1,36 +1,36 @@
-//! Sparse Cholesky `P A P^T = L L^T` (faer's supernodal factorization, one thread) in either
-//! precision.
+//! Sparse Cholesky `P A P^T = L L^T` in either precision.
 //!
 //! The fill-reducing permutation is approximate minimum degree (Amestoy, Davis and Duff 1996) on
-//! the graph of 3x3 blocks, expanded to scalars: the same fill as on scalars, several times
-//! cheaper, and the three scalars of a vertex stay together in a supernode. Values are permuted
-//! while they are copied from blocks into the lower triangle by scalar columns, so that faer
-//! factors them in place under the identity ordering.
+//! the graph of 3x3 blocks, brought into postorder and expanded to the scalars that are unknowns: the same fill as on scalars, several times
+//! cheaper, and the scalars of a vertex stay together in a supernode. The supernodes are faer's; [`fronts`](super::fronts) factors and
+//! [`substitution`](super::substitution) solves.
 //!
 //! Permutation, symbolic factor and work memory are a function of the pattern alone and are kept
-//! while it stays the same; then a new factor allocates nothing.
+//! while it stays the same; then a new factor of a small matrix allocates nothing.
 //!
 //! A matrix is refused as not positive definite when a pivot is not above 64 times the unit
 //! roundoff times the diagonal entry it came from (its solution would have no correct digit), and
 //! when an entry is not finite.
 
 use super::LinearError;
+use super::fronts::{Entry, Fronts, Source};
 use super::substitution::Substitution;
+use super::tree::{Tree, columns, panel, postorder};
 use crate::math::block::{BlockMatrix, BlockPattern};
 use crate::math::parallel::Workers;
 use crate::math::{Mat3, Vec3};
 use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt::factor::LltRegularization;
+use faer::sparse::SymbolicSparseColMatRef;
 use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::amd;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
     factorize_symbolic_cholesky, supernodal,
 };
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRef};
 use faer::traits::RealField;
 use faer::{Conj, Mat, Par, Side};
-use std::ops::{Add, AddAssign, Div, Mul, Sub, SubAssign};
+use pulp::Simd;
+use std::ops::{Add, AddAssign, Div, Mul, MulAssign, Range, Sub, SubAssign};
 
 /// A precision to factor in.
 pub(super) trait Number:
@@ -44,44 +44,104 @@ pub(super) trait Number:
     + Div<Output = Self>
     + AddAssign
     + SubAssign
+    + MulAssign
+    + Default
 {
     /// Distance from 1 to the next number.
     const EPSILON: f64;
     /// The nearest number.
     fn of(value: f64) -> Self;
+    /// Inner products of columns with `x`, all of one length.
+    fn dots<S: Simd, const K: usize>(simd: S, columns: [&[Self]; K], x: &[Self]) -> [Self; K];
 }
 
-impl Number for f64 {
-    const EPSILON: f64 = f64::EPSILON;
-    fn of(value: f64) -> Self {
-        value
-    }
+macro_rules! number {
+    ($number:ty, $split:ident, $splat:ident, $fused:ident, $add:ident, $sum:ident) => {
+        impl Number for $number {
+            const EPSILON: f64 = <$number>::EPSILON as f64;
+            fn of(value: f64) -> Self {
+                value as $number
+            }
+            #[inline(always)]
+            fn dots<S: Simd, const K: usize>(
+                simd: S,
+                columns: [&[Self]; K],
+                x: &[Self],
+            ) -> [Self; K] {
+                let (x, rest) = S::$split(x);
+                let (pairs, last) = x.as_chunks::<2>();
+                // closures would not be compiled for the instructions of `simd`
+                let mut parts = [S::$split(columns[0]); K];
+                let mut whole = [&parts[0].0.as_chunks::<2>().0[..pairs.len()]; K];
+                for k in 0..K {
+                    parts[k] = S::$split(columns[k]);
+                    whole[k] = &parts[k].0.as_chunks::<2>().0[..pairs.len()];
+                }
+                // two strands for each column: a sum waits for the one before
+                let mut sums = [[simd.$splat(0.0); 2]; K];
+                for (i, x) in pairs.iter().enumerate() {
+                    for k in 0..K {
+                        let column = &whole[k][i];
+                        sums[k] = [
+                            simd.$fused(column[0], x[0], sums[k][0]),
+                            simd.$fused(column[1], x[1], sums[k][1]),
+                        ];
+                    }
+                }
+                if let [x] = last {
+                    for k in 0..K {
+                        sums[k][0] = simd.$fused(parts[k].0[2 * pairs.len()], *x, sums[k][0]);
+                    }
+                }
+                let mut out = [0.0; K];
+                for k in 0..K {
+                    out[k] = simd.$sum(simd.$add(sums[k][0], sums[k][1]));
+                }
+                for (i, x) in rest.iter().enumerate() {
+                    for k in 0..K {
+                        out[k] += parts[k].1[i] * x;
+                    }
+                }
+                out
+            }
+        }
+    };
 }
 
-impl Number for f32 {
-    const EPSILON: f64 = f32::EPSILON as f64;
-    fn of(value: f64) -> Self {
-        value as f32
-    }
-}
+number!(
+    f64,
+    as_simd_f64s,
+    splat_f64s,
+    mul_add_e_f64s,
+    add_f64s,
+    reduce_sum_f64s
+);
+number!(
+    f32,
+    as_simd_f32s,
+    splat_f32s,
+    mul_add_e_f32s,
+    add_f32s,
+    reduce_sum_f32s
+);
 
 /// What depends on the pattern, and memory of the sizes it asks for.
 pub(super) struct Cholesky<T> {
     pattern: BlockPattern,
     /// New place of each block row.
     place: Vec<u32>,
-    /// `2 * slot + transposed` of the blocks of the permuted lower triangle, column by column.
-    source: Vec<u32>,
-    /// Start of each permuted block column in `source`.
+    /// First scalar of each permuted block row, and their number.
+    offsets: Vec<u32>,
+    /// Blocks of the permuted lower triangle, column by column.
+    entries: Vec<Entry>,
+    /// Start of each permuted block column in `entries`.
     starts: Vec<u32>,
-    lower: SymbolicSparseColMat<u32>,
     symbolic: SymbolicCholesky<u32>,
-    values: Vec<T>,
+    tree: Tree,
+    fronts: Fronts<T>,
     factor: Vec<T>,
     rhs: Vec<T>,
     substitution: Substitution<T>,
-    factor_memory: MemBuffer,
-    work_bytes: usize,
 }
 
 impl<T: Number> Cholesky<T> {
@@ -107,31 +167,59 @@ impl<T: Number> Cholesky<T> {
         if 9 * pattern.rows.len() > u32::MAX as usize {
             return Err(LinearError::NoConvergence);
         }
-        let place = minimum_degree(pattern)?;
+        let mut place = minimum_degree(pattern)?;
+        postorder(pattern, &mut place);
+        let mut offsets = vec![0; n + 1];
+        for (j, p) in (0..).zip(&place) {
+            offsets[*p as usize + 1] = u32::from(pattern.width(j));
+        }
+        for p in 0..n {
+            offsets[p + 1] += offsets[p];
+        }
 
-        // Permuted block columns of the lower triangle: (column, row, source), sorted.
-        let mut entries = Vec::with_capacity(pattern.rows.len());
-        for j in 0..n {
-            for k in pattern.starts[j] as usize..pattern.starts[j + 1] as usize {
-                let (p, q) = (place[pattern.rows[k] as usize], place[j]);
-                let transposed = p < q;
-                entries.push((p.min(q), p.max(q), 2 * k as u32 + u32::from(transposed)));
-            }
-        }
-        entries.sort_unstable();
+        // Permuted block columns of the lower triangle, each sorted by rows; at first with the rows themselves.
         let mut starts = vec![0_u32; n + 1];
-        for &(column, _, _) in &entries {
-            starts[column as usize + 1] += 1;
-        }
+        let each = |visit: &mut dyn FnMut(u32, Entry)| {
+            for j in 0..n {
+                for k in pattern.starts[j]..pattern.starts[j + 1] {
+                    let i = pattern.rows[k as usize];
+                    let (p, q) = (place[i as usize], place[j]);
+                    let transposed = p < q;
+                    let entry = Entry {
+                        slot: k,
+                        row: p.max(q),
+                        height: pattern.width(if transposed { j as u32 } else { i }),
+                        transposed,
+                    };
+                    visit(p.min(q), entry);
+                }
+            }
+        };
+        each(&mut |column, _| starts[column as usize + 1] += 1);
         for j in 0..n {
             starts[j + 1] += starts[j];
         }
+        let mut next = starts.clone();
+        let empty = Entry {
+            slot: 0,
+            row: 0,
+            height: 0,
+            transposed: false,
+        };
+        let mut entries = vec![empty; pattern.rows.len()];
+        each(&mut |column, entry| {
+            entries[next[column as usize] as usize] = entry;
+            next[column as usize] += 1;
+        });
+        for j in 0..n {
+            entries[starts[j] as usize..starts[j + 1] as usize].sort_unstable_by_key(|e| e.row);
+        }
 
-        let lower = scalar_lower(n, &starts, &entries);
+        let count = offsets[n] as usize;
         let symbolic = {
-            let (column_starts, rows) = scalar_upper(n, &entries);
+            let (column_starts, rows) = scalar_upper(&offsets, &starts, &entries);
             let upper =
-                SymbolicSparseColMatRef::new_checked(3 * n, 3 * n, &column_starts, None, &rows);
+                SymbolicSparseColMatRef::new_checked(count, count, &column_starts, None, &rows);
             let params = CholeskySymbolicParams {
                 supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
                 ..Default::default()
@@ -139,103 +227,57 @@ impl<T: Number> Cholesky<T> {
             factorize_symbolic_cholesky(upper, Side::Upper, SymmetricOrdering::Identity, params)
                 .map_err(|_| LinearError::NoConvergence)?
         };
-        let factor_need = symbolic.factorize_numeric_llt_scratch::<T>(Par::Seq, Default::default());
+        let (mut tree, mut fronts, mut substitution) = Default::default();
+        // faer has no supernodes of an empty matrix
+        if count > 0 {
+            let nodes = supernodal(&symbolic)?;
+            place_in_fronts(nodes, &offsets, &starts, &mut entries);
+            tree = Tree::new(nodes)?;
+            fronts = Fronts::new(nodes, &tree);
+            substitution = Substitution::new(nodes, &tree);
+        }
         Ok(Self {
             pattern: pattern.clone(),
             place,
-            source: entries.iter().map(|e| e.2).collect(),
+            offsets,
+            entries,
             starts,
-            values: vec![T::of(0.0); lower.row_idx().len()],
             factor: vec![T::of(0.0); symbolic.len_val()],
-            rhs: vec![T::of(0.0); 3 * n],
-            substitution: Substitution::new(&symbolic)?,
-            factor_memory: MemBuffer::try_new(factor_need)
-                .map_err(|_| LinearError::NoConvergence)?,
-            work_bytes: factor_need.unaligned_bytes_required(),
-            lower,
+            rhs: vec![T::of(0.0); count],
+            fronts,
+            substitution,
+            tree,
             symbolic,
         })
     }
 
     /// Factors a matrix of the pattern.
-    pub(super) fn prepare(&mut self, matrix: &BlockMatrix) -> Result<(), LinearError> {
-        self.prepare_blocks(|slot| matrix.blocks[slot])
+    pub(super) fn prepare(
+        &mut self,
+        matrix: &BlockMatrix,
+        workers: &Workers,
+    ) -> Result<(), LinearError> {
+        self.prepare_blocks(|slot| matrix.blocks[slot], workers)
     }
 
     /// The same with the blocks of the pattern by their slots.
     pub(super) fn prepare_blocks(
         &mut self,
-        block: impl Fn(usize) -> Mat3,
+        block: impl Fn(usize) -> Mat3 + Sync,
+        workers: &Workers,
     ) -> Result<(), LinearError> {
-        self.load(block)?;
-        self.factorize()
-    }
-
-    /// Copies the blocks into permuted scalar columns; refuses what is not finite.
-    fn load(&mut self, block: impl Fn(usize) -> Mat3) -> Result<(), LinearError> {
-        let mut poison = 0.0;
-        let mut at = 0;
-        for j in 0..self.place.len() {
-            let blocks = &self.source[self.starts[j] as usize..self.starts[j + 1] as usize];
-            for c in 0..3 {
-                for (k, &source) in blocks.iter().enumerate() {
-                    let block = block(source as usize >> 1);
-                    // The diagonal block comes first in its column and gives its lower part.
-                    for r in if k == 0 { c } else { 0 }..3 {
-                        let value = if source & 1 == 1 {
-                            block[(c, r)]
-                        } else {
-                            block[(r, c)]
-                        };
-                        poison += value * 0.0;
-                        self.values[at] = T::of(value);
-                        at += 1;
-                    }
-                }
-            }
-        }
-        if poison.is_nan() {
-            return Err(LinearError::NotPositiveDefinite);
-        }
-        Ok(())
-    }
-
-    fn factorize(&mut self) -> Result<(), LinearError> {
         if self.place.is_empty() {
             return Ok(());
         }
-        self.symbolic
-            .factorize_numeric_llt(
-                &mut self.factor,
-                SparseColMatRef::new(self.lower.as_ref(), &self.values),
-                Side::Lower,
-                LltRegularization::default(),
-                Par::Seq,
-                MemStack::new(&mut self.factor_memory),
-                Default::default(),
-            )
-            .map_err(|_| LinearError::NotPositiveDefinite)?;
-        self.check_pivots()
-    }
-
-    /// Compares every pivot with the diagonal entry that it was reduced from.
-    fn check_pivots(&self) -> Result<(), LinearError> {
-        let symbolic = supernodal(&self.symbolic)?;
-        let factor = supernodal::SupernodalLltRef::new(symbolic, &self.factor);
-        let columns = self.lower.col_ptr();
-        for s in 0..symbolic.n_supernodes() {
-            let node = factor.supernode(s);
-            let block = node.val();
-            for c in 0..block.ncols() {
-                let root: f64 = block[(c, c)].into();
-                let diagonal: f64 = self.values[columns[node.start() + c] as usize].into();
-                let pivot = root * root;
-                if pivot.is_nan() || pivot <= 64.0 * T::EPSILON * diagonal {
-                    return Err(LinearError::NotPositiveDefinite);
-                }
-            }
-        }
-        Ok(())
+        let source = Source {
+            symbolic: supernodal(&self.symbolic)?,
+            tree: &self.tree,
+            block,
+            offsets: &self.offsets,
+            starts: &self.starts,
+            entries: &self.entries,
+        };
+        self.fronts.factorize(&source, &mut self.factor, workers)
     }
 
     /// Solves with the factor.
@@ -249,8 +291,8 @@ impl<T: Number> Cholesky<T> {
             return Ok(());
         }
         for (b, &p) in b.iter().zip(&self.place) {
-            for c in 0..3 {
-                self.rhs[3 * p as usize + c] = T::of(b[c]);
+            for (x, b) in self.rhs[scalars(&self.offsets, p)].iter_mut().zip(b) {
+                *x = T::of(*b);
             }
         }
         self.substitution.solve(
@@ -259,8 +301,12 @@ impl<T: Number> Cholesky<T> {
             &mut self.rhs,
             workers,
         );
-        for (x, &p) in x.iter_mut().zip(&self.place) {
-            *x = Vec3::from_fn(|c, _| self.rhs[3 * p as usize + c].into());
+        for ((x, b), &p) in x.iter_mut().zip(b).zip(&self.place) {
+            // what is no unknown has the row of the identity
+            *x = *b;
+            for (x, solved) in x.iter_mut().zip(&self.rhs[scalars(&self.offsets, p)]) {
+                *x = (*solved).into();
+            }
             if !x.iter().all(|v| v.is_finite()) {
                 return Err(LinearError::NoConvergence);
             }
@@ -273,12 +319,15 @@ impl<T: Number> Cholesky<T> {
     where
         T: RealField,
     {
-        let n = 3 * self.place.len();
-        let mut permuted = Mat::<T>::zeros(n, right.len());
-        let place = |i: usize| 3 * self.place[i / 3] as usize + i % 3;
+        let mut permuted = Mat::<T>::zeros(self.rhs.len(), right.len());
+        let place = |i: usize| scalars(&self.offsets, self.place[i / 3]).nth(i % 3);
+        let mut out = Mat::zeros(3 * self.place.len(), right.len());
         for (k, column) in right.iter().enumerate() {
             for (i, value) in column {
-                permuted[(place(*i as usize), k)] = T::of(*value);
+                match place(*i as usize) {
+                    Some(i) => permuted[(i, k)] = T::of(*value),
+                    None => out[(*i as usize, k)] = *value,
+                }
             }
         }
         if let SymbolicCholeskyRaw::Supernodal(symbolic) = self.symbolic.raw() {
@@ -291,7 +340,14 @@ impl<T: Number> Cholesky<T> {
                 MemStack::new(&mut memory),
             );
         }
-        Mat::from_fn(n, right.len(), |i, k| permuted[(place(i), k)].into())
+        for i in 0..out.nrows() {
+            if let Some(place) = place(i) {
+                for k in 0..right.len() {
+                    out[(i, k)] = permuted[(place, k)].into();
+                }
+            }
+        }
+        out
     }
 
     /// Stored numbers of the factor, padding of supernodes included.
@@ -306,20 +362,45 @@ impl<T: Number> Cholesky<T> {
 
     /// Bytes held.
     pub(super) fn bytes(&self) -> usize {
-        let numbers = self.values.len() + self.factor.len() + self.rhs.len();
-        let indices = self.place.len()
-            + self.source.len()
-            + self.starts.len()
-            + self.lower.row_idx().len()
-            + self.lower.col_ptr().len();
+        let numbers = self.factor.len() + self.rhs.len();
+        let indices = self.place.len() + self.offsets.len() + self.starts.len();
         let symbolic = match self.symbolic.raw() {
             SymbolicCholeskyRaw::Supernodal(s) => s.row_idx().len() + 4 * s.n_supernodes(),
             SymbolicCholeskyRaw::Simplicial(s) => s.row_idx().len() + s.nrows(),
         };
+        let pattern = self.pattern.rows.len() + self.pattern.starts.len();
         size_of::<T>() * numbers
-            + 4 * (indices + symbolic + self.pattern.rows.len() + self.pattern.starts.len())
-            + self.work_bytes
+            + 4 * (indices + symbolic + pattern)
+            + size_of::<Entry>() * self.entries.len()
+            + self.tree.bytes()
+            + self.fronts.bytes()
             + self.substitution.bytes()
+    }
+}
+
+/// Replaces the block rows of sorted entries by their places in the fronts of their columns.
+fn place_in_fronts(
+    symbolic: &supernodal::SymbolicSupernodalCholesky<u32>,
+    offsets: &[u32],
+    starts: &[u32],
+    entries: &mut [Entry],
+) {
+    let mut column = 0;
+    for s in 0..symbolic.n_supernodes() {
+        let (inside, below) = (columns(symbolic, s), panel(symbolic, s).0);
+        while column + 1 < offsets.len() && (offsets[column] as usize) < inside.end {
+            let mut at = 0;
+            for entry in &mut entries[starts[column] as usize..starts[column + 1] as usize] {
+                let row = offsets[entry.row as usize];
+                entry.row = if (row as usize) < inside.end {
+                    row - inside.start as u32
+                } else {
+                    at += below[at..].partition_point(|r| *r < row);
+                    (inside.len() + at) as u32
+                };
+            }
+            column += 1;
+        }
     }
 }
 
@@ -352,52 +433,37 @@ fn minimum_degree(pattern: &BlockPattern) -> Result<Vec<u32>, LinearError> {
     Ok(place)
 }
 
-/// Scalar columns of the lower triangle from sorted block entries `(column, row, _)`.
-fn scalar_lower(
-    n: usize,
-    starts: &[u32],
-    entries: &[(u32, u32, u32)],
-) -> SymbolicSparseColMat<u32> {
-    let mut column_starts = Vec::with_capacity(3 * n + 1);
-    let mut rows = Vec::with_capacity(9 * entries.len());
-    column_starts.push(0);
-    for j in 0..n {
-        for c in 0..3 {
-            for &(column, row, _) in &entries[starts[j] as usize..starts[j + 1] as usize] {
-                let first = if row == column { c } else { 0 };
-                rows.extend((first..3).map(|r| 3 * row + r));
-            }
-            column_starts.push(rows.len() as u32);
-        }
-    }
-    rows.shrink_to_fit();
-    SymbolicSparseColMat::new_checked(3 * n, 3 * n, column_starts, None, rows)
+/// Scalars of a permuted block row.
+fn scalars(offsets: &[u32], p: u32) -> Range<usize> {
+    offsets[p as usize] as usize..offsets[p as usize + 1] as usize
 }
 
-/// Scalar columns of the upper triangle (what the symbolic analysis reads) from the same entries.
-fn scalar_upper(n: usize, entries: &[(u32, u32, u32)]) -> (Vec<u32>, Vec<u32>) {
-    // Sorted by (column, row) of the lower triangle, so each upper column fills in row order.
+/// Scalar columns of the upper triangle (what the symbolic analysis reads) from the entries of the block columns of the lower one.
+fn scalar_upper(offsets: &[u32], starts: &[u32], entries: &[Entry]) -> (Vec<u32>, Vec<u32>) {
+    // the columns of the lower triangle come in order, so each column of the upper one fills in the order of its rows
+    let n = starts.len() - 1;
     let mut counts = vec![0_usize; n + 1];
-    for &(_, row, _) in entries {
-        counts[row as usize + 1] += 1;
+    for entry in entries {
+        counts[entry.row as usize + 1] += 1;
     }
     for j in 0..n {
         counts[j + 1] += counts[j];
     }
     let mut block_rows = vec![0; entries.len()];
     let mut next = counts.clone();
-    for &(column, row, _) in entries {
-        block_rows[next[row as usize]] = column;
-        next[row as usize] += 1;
+    for (column, ends) in (0..).zip(starts.windows(2)) {
+        for entry in &entries[ends[0] as usize..ends[1] as usize] {
+            block_rows[next[entry.row as usize]] = column;
+            next[entry.row as usize] += 1;
+        }
     }
-    let mut column_starts = Vec::with_capacity(3 * n + 1);
+    let mut column_starts = Vec::with_capacity(offsets[n] as usize + 1);
     let mut rows = Vec::with_capacity(9 * entries.len());
     column_starts.push(0);
     for j in 0..n {
-        for c in 0..3 {
+        for column in offsets[j]..offsets[j + 1] {
             for &i in &block_rows[counts[j]..counts[j + 1]] {
-                let last = if i as usize == j { c } else { 2 };
-                rows.extend((0..=last).map(|r| 3 * i + r));
+                rows.extend(offsets[i as usize]..offsets[i as usize + 1].min(column + 1));
             }
             column_starts.push(rows.len() as u32);
         }

@@ -21,9 +21,9 @@
 //!
 //! Yarns, whose stretch is 1e4 times as stiff as their bending, have a `rho` of 1e5 at 1 ms. Incomplete factors take hundreds of
 //! iterations there: kept factors serve motion and rest, and every matrix of small systems is factored as it is. In a hanging swatch of 16 772
-//! nodes a step of 1 ms takes 106 us a node by kept factors and 213 by those of overlapping parts
-//! ([`super::schwarz`]), both with the same error, and 5.9 KB a node against 26; at 4 292 nodes 100, 150 to 210, and exact factors 190, on
-//! one thread.
+//! nodes a step of 1 ms took half the time by kept factors that it took by those of overlapping parts
+//! ([`super::schwarz`]), both with the same error, and a quarter of the memory; at 4 292 nodes, where exact factors took twice as long as kept ones, a little
+//! less.
 //!
 //! `rho` is read off the matrix: internal stiffness has zero row sums, so what a row's blocks sum
 //! to is its mass term, and `rho` is the median over vertices of trace(diagonal block) over
@@ -83,7 +83,7 @@ pub enum Made<'a> {
 pub fn solver(kind: u32, n: usize, made: Made<'_>, workers: &Workers) -> Box<dyn LinearSolver> {
     match kind {
         1 => Box::new(Direct::new(workers)),
-        2 => Box::new(ConjugateGradients::new(Box::new(BlockJacobi::new()))),
+        2 => Box::new(ConjugateGradients::new(Box::new(BlockJacobi::new())).on(workers)),
         3 => Box::new(incomplete(made)),
         4 => Box::new(factored(made, workers)),
         5 => Box::new(parted(workers)),
@@ -104,7 +104,7 @@ pub fn filtered(kind: u32, filter: &Arc<Filter>, workers: &Workers) -> Box<dyn L
     };
     let costly = beside == Beside::Parts;
     let levels = Box::new(Filtered::new(filter, beside, true, workers));
-    let cg = ConjugateGradients::new(levels);
+    let cg = ConjugateGradients::new(levels).on(workers);
     // diagonal blocks are cheap to make and take too many iterations to end early
     Box::new(if costly {
         cg.for_newton(KEPT_YARNS[1])
@@ -114,7 +114,7 @@ pub fn filtered(kind: u32, filter: &Arc<Filter>, workers: &Workers) -> Box<dyn L
 }
 
 fn factored(made: Made<'_>, workers: &Workers) -> ConjugateGradients {
-    let cg = ConjugateGradients::new(Box::new(SingleFactor::new(workers)));
+    let cg = ConjugateGradients::new(Box::new(SingleFactor::new(workers))).on(workers);
     match made {
         Made::Triangles(_) => cg.for_newton(KEPT),
         Made::Yarns => cg.for_newton(KEPT_YARNS[0]).in_energy(),
@@ -123,6 +123,7 @@ fn factored(made: Made<'_>, workers: &Workers) -> ConjugateGradients {
 
 fn parted(workers: &Workers) -> ConjugateGradients {
     ConjugateGradients::new(Box::new(Schwarz::new(workers)))
+        .on(workers)
         .for_newton(KEPT_YARNS[1])
         .in_energy()
 }

@@ -137,7 +137,11 @@ impl Constrained {
             }
             starts.push(rows.len() as u32);
         }
-        self.first = BlockMatrix::zeros(BlockPattern { starts, rows });
+        self.first = BlockMatrix::zeros(BlockPattern {
+            starts,
+            rows,
+            widths: Vec::new(),
+        });
         self.plan = Some(Plan {
             pattern: pattern.clone(),
             place,
@@ -379,7 +383,8 @@ impl LinearSolver for Constrained {
                 *block = matrix.blocks[*slot as usize];
             }
         }
-        Cholesky::for_pattern(&mut self.cholesky, &self.first.pattern)?.prepare(&self.first)?;
+        Cholesky::for_pattern(&mut self.cholesky, &self.first.pattern)?
+            .prepare(&self.first, &self.workers)?;
         let corner = self.border(matrix);
         self.factor_dense(corner)
     }

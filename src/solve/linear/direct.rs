@@ -46,7 +46,8 @@ impl LinearSolver for Direct {
 
     fn prepare(&mut self, matrix: &BlockMatrix) -> Result<(), LinearError> {
         self.factored = false;
-        Cholesky::for_pattern(&mut self.cholesky, &matrix.pattern)?.prepare(matrix)?;
+        Cholesky::for_pattern(&mut self.cholesky, &matrix.pattern)?
+            .prepare(matrix, &self.workers)?;
         self.factored = true;
         Ok(())
     }

@@ -38,7 +38,7 @@ impl Preconditioner for SingleFactor {
     fn prepare(&mut self, matrix: &BlockMatrix) -> Result<(), LinearError> {
         self.stiff.take(matrix);
         Cholesky::for_pattern(&mut self.cholesky, self.stiff.pattern())?
-            .prepare_blocks(|slot| self.stiff.block(matrix, slot))
+            .prepare_blocks(|slot| self.stiff.block(matrix, slot), &self.workers)
     }
 
     fn forget(&mut self) {

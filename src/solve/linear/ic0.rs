@@ -197,6 +197,7 @@ impl Plan {
         let permuted = BlockPattern {
             starts,
             rows: entries.iter().map(|e| e.1).collect(),
+            widths: Vec::new(),
         };
 
         let mut updates = Vec::new();

@@ -1,6 +1,7 @@
 //! Linear systems `A x = b` with symmetric positive definite block-sparse `A`, behind one trait.
 //!
-//! * [`direct`]: supernodal Cholesky, ordered by approximate minimum degree on the block graph.
+//! * [`direct`]: [`cholesky`] by supernodes, ordered by approximate minimum degree on the block graph; [`fronts`] factor,
+//!   [`substitution`] solves, and both have the subtrees of the elimination [`tree`] side by side.
 //! * [`pcg`]: conjugate gradients with a [`pcg::Preconditioner`]: [`jacobi`] (3x3 diagonal blocks),
 //!   [`ic0`] (incomplete Cholesky on the pattern of `A`, in an [`ordering`]), [`factored`] (the
 //!   complete factor of an earlier matrix, of its stiff part) or [`schwarz`] (factors of overlapping parts of the [`graph`]).
@@ -15,14 +16,17 @@ pub mod constrained;
 pub mod direct;
 pub mod factored;
 pub mod filtered;
+mod fronts;
 pub mod graph;
 pub mod ic0;
 pub mod jacobi;
 pub mod ordering;
 pub mod pcg;
+mod product;
 pub mod schwarz;
 mod stiff_part;
 mod substitution;
+mod tree;
 
 use crate::math::Vec3;
 use crate::math::block::BlockMatrix;

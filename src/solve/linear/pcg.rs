@@ -10,9 +10,11 @@
 //! A direction of negative curvature gives `NotPositiveDefinite`. Sums run over vertices in order,
 //! so results do not depend on threads. No allocation while the size stays the same.
 
+use super::product::Multiplication;
 use super::{LinearError, LinearSolver, Product};
 use crate::math::Vec3;
 use crate::math::block::{BlockMatrix, BlockPattern};
+use crate::math::parallel::Workers;
 
 /// An approximation of the inverse, symmetric and positive definite.
 pub trait Preconditioner: Send {
@@ -65,6 +67,7 @@ pub struct ConjugateGradients {
     in_energy: bool,
     /// Whether matrices come by their diagonal blocks.
     matrix_free: bool,
+    multiplication: Multiplication,
     r: Vec<Vec3>,
     z: Vec<Vec3>,
     p: Vec<Vec3>,
@@ -80,6 +83,7 @@ impl ConjugateGradients {
             series: None,
             in_energy: false,
             matrix_free: false,
+            multiplication: Multiplication::default(),
             r: Vec::new(),
             z: Vec::new(),
             p: Vec::new(),
@@ -118,6 +122,13 @@ impl ConjugateGradients {
     #[must_use]
     pub fn matrix_free(mut self) -> Self {
         self.matrix_free = true;
+        self
+    }
+
+    /// The same that multiplies on these threads.
+    #[must_use]
+    pub fn on(mut self, workers: &Workers) -> Self {
+        self.multiplication = Multiplication::new(workers);
         self
     }
 
@@ -172,7 +183,11 @@ impl LinearSolver for ConjugateGradients {
         if matrix.n() != b.len() {
             return Err(LinearError::NoConvergence);
         }
-        self.solve_by(&mut |x, y| matrix.multiply(x, y), b, x, tolerance)
+        let mut multiplication = std::mem::take(&mut self.multiplication);
+        let mut product = |x: &[Vec3], y: &mut [Vec3]| multiplication.multiply(matrix, x, y);
+        let solved = self.solve_by(&mut product, b, x, tolerance);
+        self.multiplication = multiplication;
+        solved
     }
 
     fn is_matrix_free(&self) -> bool {
@@ -236,7 +251,9 @@ impl LinearSolver for ConjugateGradients {
     }
 
     fn bytes(&self) -> usize {
-        4 * size_of::<Vec3>() * self.r.len() + self.preconditioner.bytes()
+        4 * size_of::<Vec3>() * self.r.len()
+            + self.multiplication.bytes()
+            + self.preconditioner.bytes()
     }
 }
 

@@ -141,9 +141,13 @@ impl Part {
         for row in &rows {
             local[*row as usize] = NOWHERE;
         }
+        let widths = rows
+            .iter()
+            .filter_map(|row| pattern.widths.get(*row as usize));
         let pattern = BlockPattern {
             starts,
             rows: inside,
+            widths: widths.copied().collect(),
         };
         let zeros = vec![Vec3::zeros(); rows.len()];
         Self {
@@ -161,11 +165,13 @@ impl Part {
     fn prepare(&mut self, whole: &BlockMatrix) -> Result<(), LinearError> {
         let block = |slot: usize| whole.blocks[self.source[slot] as usize];
         let single = Cholesky::for_pattern(&mut self.single, &self.pattern)?;
-        if single.prepare_blocks(block).is_ok() {
+        // a part is one task: no threads within
+        let alone = Workers::default();
+        if single.prepare_blocks(block, &alone).is_ok() {
             self.double = None;
             return Ok(());
         }
-        Cholesky::for_pattern(&mut self.double, &self.pattern)?.prepare_blocks(block)
+        Cholesky::for_pattern(&mut self.double, &self.pattern)?.prepare_blocks(block, &alone)
     }
 
     fn solve(&mut self, r: &[Vec3]) -> Result<(), LinearError> {

@@ -92,7 +92,11 @@ impl StiffPart {
             starts.push(rows.len() as u32);
         }
         self.lumps.resize(n, 0.0);
-        self.pattern = BlockPattern { starts, rows };
+        self.pattern = BlockPattern {
+            starts,
+            rows,
+            widths: pattern.widths.clone(),
+        };
         self.whole = pattern.clone();
     }
 

@@ -91,6 +91,10 @@ impl Term for BodyContact {
         }
     }
 
+    fn bytes(&self) -> usize {
+        size_of_val(&self.vertices[..]) + 16 * self.areas.len() + size_of_val(&self.rubs[..])
+    }
+
     fn value(&self, e: usize, at: &Configuration<'_>) -> f64 {
         let bodies = at.world.bodies;
         let x = &at.x[e];

@@ -92,6 +92,10 @@ impl Term for EdgeContact {
         }
     }
 
+    fn bytes(&self) -> usize {
+        size_of_val(&self.vertices[..]) + size_of_val(&self.areas[..])
+    }
+
     fn value(&self, e: usize, at: &Configuration<'_>) -> f64 {
         let m = self.middle(e, at.x);
         self.touching(e, at, &m)

@@ -243,6 +243,12 @@ impl Term for SelfContact {
         }
     }
 
+    fn bytes(&self) -> usize {
+        size_of_val(&self.stencils[..])
+            + size_of_val(&self.pairs[..])
+            + size_of_val(&self.normals[..])
+    }
+
     fn value(&self, e: usize, at: &Configuration<'_>) -> f64 {
         let pair = &self.pairs[e];
         let (d, _) = self.offset(e, at.x);

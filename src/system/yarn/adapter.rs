@@ -239,6 +239,10 @@ impl<K: Kernel<N>, const N: usize> Term for YarnTerm<K, N> {
         }
     }
 
+    fn bytes(&self) -> usize {
+        size_of_val(&self.blocks[..]) + size_of_val(&self.elements[..])
+    }
+
     fn value(&self, e: usize, at: &Configuration<'_>) -> f64 {
         self.with(e, at, |kernel, local| kernel.value(local)) * self.elements[e].weight
     }

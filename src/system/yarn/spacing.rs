@@ -3,7 +3,14 @@
 //!
 //! Acts on material coordinates alone; `L` is the length at rest. Fibres pack before they resist (van Wyk 1946): the
 //! stiffness grows from zero over a quarter of `d` to `k_c L`, `R''(t) = t/w` up to `w = d/4` and 1 beyond, so that
-//! there is no kink where contact begins. Where contacts may come off, which they do in time alone and not at
+//! there is no kink where contact begins. Fibres do not vanish: below `h = d/4` a barrier keeps two crossings from becoming one point,
+//! at which yarn has no direction,
+//!
+//! ```text
+//! V = k_c L h^2/3 (1 - s)^3/s,   s = du/h < 1
+//! ```
+//!
+//! Where contacts may come off, which they do in time alone and not at
 //! pins, `d` is smaller in time than in relaxations. Damping acts on `min(du - d, 0)`. `Psd` and `Exact` agree, but
 //! for the kink of the damping at `du = d`. SI units; `k_c` in N/m^2.
 
@@ -13,6 +20,11 @@ use super::kernel::{Kernel, Local, Lower};
 
 /// Part of the least length over which the stiffness grows.
 const SOFT: f64 = 0.25;
+
+/// Part of the least length below which the barrier acts.
+const BARRIER: f64 = 0.25;
+/// Part of that below which the barrier's derivatives grow no more.
+const FLOOR: f64 = 1e-6;
 
 /// Least length of one segment; scalars `(u0, u1)`.
 pub struct Spacing {
@@ -47,14 +59,29 @@ impl Spacing {
         (now, now - gap(at.q0))
     }
 
-    /// `R` and its derivatives where the length falls short by `-gap`.
+    /// Energy over `k_c L` and its derivatives by the gap, below zero.
     fn packing(&self, at: &Local<'_, 2>, gap: f64) -> [f64; 3] {
+        let least = self.least(at);
         let jam = Jam {
             factor: 2.0,
             from: 0.0,
-            width: SOFT * self.least(at),
+            width: SOFT * least,
         };
-        jam.at(-gap)
+        let [energy, slope, curvature] = jam.at(-gap);
+        let mut out = [energy, -slope, curvature];
+        let reach = BARRIER * least;
+        let s = (least + gap) / reach;
+        if s < 1.0 {
+            let (value, s) = if s > 0.0 {
+                ((1.0 - s).powi(3) / s, s.max(FLOOR))
+            } else {
+                (f64::INFINITY, FLOOR)
+            };
+            out[0] += reach * reach / 3.0 * value;
+            out[1] -= reach / 3.0 * (1.0 / (s * s) - 3.0 + 2.0 * s);
+            out[2] += 2.0 / 3.0 * (1.0 / (s * s * s) - 1.0);
+        }
+        out
     }
 }
 
@@ -73,7 +100,7 @@ impl Kernel<2> for Spacing {
     fn gradient(&self, at: &Local<'_, 2>, out: &mut [f64; 2]) {
         let (now, since) = self.gap(at);
         let force = if now < 0.0 {
-            self.stiffness * (self.damping * at.inv_dt * since - self.packing(at, now)[1])
+            self.stiffness * (self.damping * at.inv_dt * since + self.packing(at, now)[1])
         } else {
             0.0
         };

@@ -90,7 +90,8 @@ impl Diagonal {
                 }
             }
         }
-        Cholesky::for_pattern(&mut self.factor, &self.small.pattern)?.prepare(&self.small)
+        Cholesky::for_pattern(&mut self.factor, &self.small.pattern)?
+            .prepare(&self.small, &self.workers)
     }
 
     /// `z = D^-1 r`.

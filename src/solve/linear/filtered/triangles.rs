@@ -126,7 +126,8 @@ impl Triangles {
             }
         }
         self.matrix.blocks = coarse;
-        Cholesky::for_pattern(&mut self.factor, &self.matrix.pattern)?.prepare(&self.matrix)
+        Cholesky::for_pattern(&mut self.factor, &self.matrix.pattern)?
+            .prepare(&self.matrix, &self.workers)
     }
 
     /// `z += sign W (W^T A W)^-1 W^T r`.
