@@ -2,11 +2,11 @@
 //!
 //! Swatches of the sweater's jersey (loops of 3 mm, radius 0.75 mm) hang from their top course. After 20 steps
 //! of 1 ms out of the flat layout, 50 more are counted. Prints for each size and step: Newton iterations a step,
-//! microseconds of processor time per node and step and per node and Newton iteration, processor seconds per
-//! simulated second, bytes per node with the matrix and its factor, and the exponent of cost against nodes;
+//! microseconds per node and step by the clock and of processors, those per node and Newton iteration, and per node and linear one, seconds per
+//! simulated second by the clock, bytes per node with the matrix and its factor, and the exponent of cost against nodes;
 //! and the distance of the motion after 20 counted steps to that solved 30 times as exactly, over the way moved. Then swatches
 //! without weight that relax from their layout to a residual of 1e-5 N.
-//! Arguments: `--quick` leaves out the larger sizes; `--sweater` takes instead, alone, a swatch with the loops of the
+//! Arguments: `--threads N`; `--quick` leaves out the larger sizes; `--sweater` takes instead, alone, a swatch with the loops of the
 //! sweater of Cirio et al. 2017 (56 000, 224 000 nodes), and counts its first [`FIRST`] steps out of the flat layout.
 #![allow(
     clippy::unwrap_used,
@@ -46,6 +46,7 @@ fn swatch(loops: usize, gravity: f64) -> Sim {
     let garment = garment_from_json(&text, None).expect("garment");
     let options = SimOptions {
         gravity: Some([0.0, gravity, 0.0]),
+        settings: common::settings(),
         ..SimOptions::default()
     };
     let mut sim = Sim::new(&garment, &options).expect("sim");
@@ -87,27 +88,34 @@ fn motion(loops: usize, dt: f64) -> Option<(f64, f64)> {
         }
         Some(apart(&start, fast.yarn_nodes(), exact.yarn_nodes()))
     });
-    let begin = cpu();
-    let mut newton = 0;
+    let (clock, begin) = (Instant::now(), cpu());
+    let (mut newton, mut linear) = (0, 0);
     for _ in 0..COUNTED {
-        newton += sim.step(dt).ok()?.newton_iterations;
+        let report = sim.step(dt).ok()?;
+        newton += report.newton_iterations;
+        linear += report.linear_iterations;
     }
-    let seconds = cpu() - begin;
+    let (clock, seconds) = (clock.elapsed().as_secs_f64(), cpu() - begin);
     let info = sim.info();
     let nodes = info.yarn_nodes as f64;
-    let each = 1e6 * seconds / nodes / COUNTED as f64;
+    let each = |seconds: f64, times: f64| 1e6 * seconds / nodes / times;
+    let steps = COUNTED as f64;
     let text = match error {
         Some(error) => format!("{error:9.1e}"),
         None => "      none".to_owned(),
     };
     println!(
-        "{loops:5} {:7} {:8} {:5.0} {:7.1} {each:9.1} {:9.1} {:9.1} {:8} {text}",
+        "{loops:5} {:7} {:8} {:5.0} {:7.1} {:7.1} {:8.1} {:8.1} {:9.1} {:9.2} {:9.1} {:7} {text}",
         info.yarn_nodes,
         info.unknowns,
         1e3 * dt,
-        newton as f64 / COUNTED as f64,
-        1e6 * seconds / nodes / newton as f64,
-        seconds / (COUNTED as f64 * dt),
+        newton as f64 / steps,
+        linear as f64 / steps,
+        each(clock, steps),
+        each(seconds, steps),
+        each(seconds, newton as f64),
+        each(seconds, linear as f64),
+        clock / (steps * dt),
         (info.bytes + info.factor_bytes) / info.yarn_nodes,
     );
     Some((nodes, seconds))
@@ -148,8 +156,12 @@ fn main() {
     }
     let quick = given("--quick");
     let sizes: &[usize] = if quick { &[8, 16] } else { &[8, 16, 32, 64] };
-    println!("loops   nodes unknowns dt/ms Newton us/node  us/node    CPU s  bytes/  error");
-    println!("                             a step  a step   a Newton  a sim s  node");
+    println!(
+        "loops   nodes unknowns dt/ms  Newton  linear  us/node  us/node   us/node   us/node  clock s  bytes/  error"
+    );
+    println!(
+        "                              a step  a step    clock      CPU  a Newton  a linear  a sim s    node"
+    );
     for dt in [1e-3, 5e-3] {
         let points: Vec<(f64, f64)> = sizes.iter().filter_map(|&n| motion(n, dt)).collect();
         println!("cost ~ nodes^{:.2}", exponent(&points));

@@ -4,9 +4,9 @@
 //! tied at the seams, and taken to where the triangles lie. Loops are as wide as gives their number: 56 000 for the
 //! sweater of figure 1, 325 000 for the T-shirt of figure 10; the yarn is the sweater's, as thick for its loops. Every yarn springs from its flat layout
 //! in the first steps of 1 ms; cloth does not touch itself, since a node may come near others by 0.15 radii a
-//! substep only, which made 33 to 38 substeps of each step with 5 000 loops. Prints what is laid and its memory, and for each step Newton and linear iterations, processor
-//! microseconds a node and step, memory a node with the matrix and its factor, the seams' largest gap, and the smallest gap
-//! to the body. Wants `TOILE_DATA`; one thread.
+//! substep only, which made 33 to 38 substeps of each step with 5 000 loops. Prints what is laid and its memory, and for each step Newton and linear iterations, microseconds
+//! a node and step by the clock and of processors, memory a node with the matrix and its factor, the seams' largest gap, and the smallest gap
+//! to the body. Wants `TOILE_DATA`; one thread, or those of `--threads`.
 //!
 //! `cargo bench --bench yarn_garment -- --loops 56000 --steps 3`; 0 steps lay the yarns and make the system alone.
 #![allow(
@@ -17,7 +17,8 @@
 
 mod common;
 
-use common::cpu;
+use common::{cpu, given};
+use std::time::Instant;
 use toile::math::Vec2;
 use toile::pattern::yarn_fabric::{Structure, YarnFabric};
 use toile::pattern::{BlendRegion, Garment, Shape};
@@ -44,14 +45,6 @@ fn knit(garment: &Garment, loops: f64) -> YarnFabric {
     fabric
 }
 
-fn given(name: &str, default: f64) -> f64 {
-    let mut arguments = std::env::args();
-    arguments
-        .find(|a| a == name)
-        .map(|_| arguments.next().and_then(|v| v.parse().ok()))
-        .map_or(default, |v| v.expect("a number"))
-}
-
 fn main() {
     let Some((mut garment, body)) = common::garment("gen_tshirt") else {
         return;
@@ -66,7 +59,7 @@ fn main() {
         let options = SimOptions {
             settings: Settings {
                 self_contact: 0.0,
-                ..Settings::default()
+                ..common::settings()
             },
             ..SimOptions::default()
         };
@@ -123,16 +116,19 @@ fn main() {
         "seams of yarns open by {:.1e} m, gap to the body {:.1e} m",
         report.max_seam_gap, report.min_gap
     );
-    println!("step substeps Newton linear us/node bytes/node  seams/mm  gap/mm");
+    println!("step substeps Newton linear  us/node us/node bytes/node  seams/mm  gap/mm");
+    println!("                              clock     CPU");
     for step in 1..=steps {
-        let begin = cpu();
+        let (clock, begin) = (Instant::now(), cpu());
         let report = sim.step(DT).expect("a step");
-        let (seconds, info) = (cpu() - begin, sim.info());
+        let (clock, seconds) = (clock.elapsed().as_secs_f64(), cpu() - begin);
+        let info = sim.info();
         println!(
-            "{step:4} {:8} {:6} {:6} {:7.1} {:10} {:9.2} {:7.2}",
+            "{step:4} {:8} {:6} {:6} {:8.1} {:7.1} {:10} {:9.2} {:7.2}",
             report.substeps,
             report.newton_iterations,
             report.linear_iterations,
+            1e6 * clock / info.yarn_nodes as f64,
             1e6 * seconds / info.yarn_nodes as f64,
             (info.bytes + info.factor_bytes) / info.yarn_nodes,
             1e3 * report.max_seam_gap,

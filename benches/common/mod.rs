@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use toile::body::Body;
 use toile::pattern::Garment;
 use toile::pattern::import::garment_from_file;
+use toile::sim::Settings;
 
 /// A GarmentCode pattern of the folder that `TOILE_DATA` names, and the body that it is for; `None`, and a line that says so, without.
 pub(crate) fn garment(name: &str) -> Option<(Garment, Body)> {
@@ -17,6 +18,23 @@ pub(crate) fn garment(name: &str) -> Option<(Garment, Body)> {
     let (garment, _) = garment_from_file(&path).expect("pattern");
     let body = Body::obj(&data.join("bodies/mean_all.obj"), 1.0, 0.0).expect("body");
     Some((garment, body))
+}
+
+/// The number that follows an argument of this name.
+pub(crate) fn given(name: &str, default: f64) -> f64 {
+    let mut arguments = std::env::args();
+    arguments
+        .find(|a| a == name)
+        .map(|_| arguments.next().and_then(|v| v.parse().ok()))
+        .map_or(default, |v| v.expect("a number"))
+}
+
+/// Settings with the threads that `--threads` gives, one without.
+pub(crate) fn settings() -> Settings {
+    Settings {
+        threads: given("--threads", 1.0),
+        ..Settings::default()
+    }
 }
 
 /// Processor time of all threads of this process [s], in steps of 10 ms.
