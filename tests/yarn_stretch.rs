@@ -103,6 +103,7 @@ fn an_overstretched_knit_keeps_a_set_that_grows() {
         (&[][..], &[1.04, 1.02, 1.0][..]),
         (&[1.04], &[1.08, 1.06, 1.04, 1.02, 1.0]),
         (&[1.04, 1.08], &[1.12, 1.09, 1.06, 1.03, 1.0]),
+        (&[1.15], &[1.3, 1.2, 1.15, 1.1, 1.05, 1.0]),
     ] {
         curve(&mut jersey, up);
         let mut back = curve(&mut jersey, down);
@@ -115,7 +116,10 @@ fn an_overstretched_knit_keeps_a_set_that_grows() {
         );
         sets.push(set);
     }
-    assert!(sets.windows(2).all(|w| w[1] > w[0] + 0.005), "{sets:?}");
+    // beyond 1.12 the loops are taut and yarn itself stretches: the set stays, as far as the path of friction lets
+    let (taut, slack) = sets.split_last().expect("sets");
+    assert!(slack.windows(2).all(|w| w[1] > w[0] + 0.005), "{sets:?}");
+    assert!(*taut > slack[2] + 0.005, "{sets:?}");
 }
 
 /// Jersey that was stretched by 1 % once, which lets go what its laying has left at the limit of friction, pulls as before after

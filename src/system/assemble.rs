@@ -1,7 +1,7 @@
 //! Sums of terms: energy, gradient, Hessian.
 //!
-//! Kernels run in parallel over chunks of stencils into a buffer; the scatter into vertices and
-//! blocks runs in stencil order, so that the result has the same bits for any number of threads.
+//! Kernels run in parallel over chunks of stencils into a buffer; what goes to one vertex or block is added in
+//! the order of the stencils, blocks in ranges side by side, so that the result has the same bits for any number of threads.
 //! What belongs to a point that rides on a triangle goes to the vertices that carry it. A matrix may be assembled
 //! by its diagonal blocks alone; the product with the whole of it is then that of the stencils' Hessians.
 

@@ -15,7 +15,7 @@
 use super::LinearError;
 use super::fronts::{Entry, Fronts, Source};
 use super::substitution::Substitution;
-use super::tree::{Tree, columns, panel, postorder};
+use super::tree::{Tree, columns, panel, place, postorder};
 use crate::math::block::{BlockMatrix, BlockPattern};
 use crate::math::parallel::Workers;
 use crate::math::{Mat3, Vec3};
@@ -391,13 +391,7 @@ fn place_in_fronts(
         while column + 1 < offsets.len() && (offsets[column] as usize) < inside.end {
             let mut at = 0;
             for entry in &mut entries[starts[column] as usize..starts[column + 1] as usize] {
-                let row = offsets[entry.row as usize];
-                entry.row = if (row as usize) < inside.end {
-                    row - inside.start as u32
-                } else {
-                    at += below[at..].partition_point(|r| *r < row);
-                    (inside.len() + at) as u32
-                };
+                entry.row = place(offsets[entry.row as usize], &inside, below, &mut at);
             }
             column += 1;
         }

@@ -12,7 +12,7 @@
 
 use super::LinearError;
 use super::cholesky::Number;
-use super::tree::{Tree, columns, panel, rows};
+use super::tree::{Tree, columns, panel, place, rows};
 use crate::math::Mat3;
 use crate::math::parallel::Workers;
 use faer::linalg::matmul::matmul;
@@ -105,16 +105,8 @@ impl<T: Number> Fronts<T> {
             let (inside, above) = (columns(symbolic, parent), panel(symbolic, parent).0);
             let mut at = 0;
             let own = symbolic.row_idx()[rows(symbolic, s)].iter();
-            for (place, row) in relative[rows(symbolic, s)].iter_mut().zip(own) {
-                *place = if inside.contains(&(*row as usize)) {
-                    row - inside.start as u32
-                } else {
-                    // both lists ascend
-                    while at < above.len() && above[at] < *row {
-                        at += 1;
-                    }
-                    (inside.len() + at) as u32
-                };
+            for (there, row) in relative[rows(symbolic, s)].iter_mut().zip(own) {
+                *there = place(*row, &inside, above, &mut at);
             }
         }
         let left = |s: usize| panel(symbolic, s).0.len().pow(2);

@@ -4,7 +4,7 @@
 //! added to the whole in the order of the subtrees.
 
 use super::cholesky::Number;
-use super::tree::{Tree, columns, panel, rows};
+use super::tree::{Tree, columns, panel, place, rows};
 use crate::math::parallel::Workers;
 use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 use pulp::{Arch, Simd, WithSimd};
@@ -56,13 +56,8 @@ impl<T: Number> Substitution<T> {
             for s in nodes.clone() {
                 longest = longest.max(rows(symbolic, s).len());
                 let mut at = 0;
-                for place in &mut places[rows(symbolic, s)] {
-                    *place = if (*place as usize) < inside.end {
-                        *place - inside.start as u32
-                    } else {
-                        at += above[at..].partition_point(|row| row < place);
-                        (inside.len() + at) as u32
-                    };
+                for row in &mut places[rows(symbolic, s)] {
+                    *row = place(*row, &inside, above, &mut at);
                 }
             }
             part_of[last] = parts.len();
@@ -99,15 +94,9 @@ impl<T: Number> Substitution<T> {
                 let child = &mut parts[*child];
                 child.parent = k;
                 let mut at = 0;
-                let place = |row: &u32| {
-                    if (*row as usize) < inside.end {
-                        return row - inside.start as u32;
-                    }
-                    at += rows_above[at..].partition_point(|r| r < row);
-                    (inside.len() + at) as u32
-                };
-                let own = panel(symbolic, child.nodes.end - 1).0;
-                child.above = own.iter().map(place).collect();
+                let own = panel(symbolic, child.nodes.end - 1).0.iter();
+                let places = own.map(|row| place(*row, &inside, rows_above, &mut at));
+                child.above = places.collect();
             }
             parts[k].children = children;
         }

@@ -147,6 +147,16 @@ pub(super) fn rows(symbolic: &SymbolicSupernodalCholesky<u32>, s: usize) -> Rang
     rows[s] as usize..rows[s + 1] as usize
 }
 
+/// Place of a row in a vector of the unknowns `inside` and the rows `above` them; rows are asked for in ascending order, and `at` goes on
+/// through `above`.
+pub(super) fn place(row: u32, inside: &Range<usize>, above: &[u32], at: &mut usize) -> u32 {
+    if (row as usize) < inside.end {
+        return row - inside.start as u32;
+    }
+    *at += above[*at..].partition_point(|r| *r < row);
+    (inside.len() + *at) as u32
+}
+
 /// Rearranges the new places of block rows so that the elimination tree is in postorder (Liu 1990): the fill stays the same, and
 /// nothing changes where it already is.
 pub(super) fn postorder(pattern: &BlockPattern, place: &mut [u32]) {

@@ -132,3 +132,56 @@ impl Kernel<2> for Spacing {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::kernel::Damped;
+    use super::*;
+    use crate::math::Vec3;
+
+    #[test]
+    fn the_barrier_has_its_derivatives_and_no_end() {
+        let spacing = Spacing {
+            stiffness: 300.0,
+            least: 1e-3,
+            damping: 0.0,
+            least_in_time: 1e-3,
+            nodes: [0, 1],
+            held: false,
+        };
+        let q0 = [0.0; 2];
+        let at = |q: &[f64; 2], f: &mut dyn FnMut(&Local<'_, 2>)| {
+            f(&Local {
+                q,
+                q0: &q0,
+                start: Damped::default(),
+                inv_dt: 0.0,
+                gravity: Vec3::zeros(),
+            });
+        };
+        let derivatives = |du: f64| {
+            let (mut value, mut gradient, mut hessian) = (0.0, [0.0; 2], [[0.0; 2]; 2]);
+            at(&[0.0, du], &mut |local| {
+                value = spacing.value(local);
+                spacing.derivatives(local, 0.0, &mut gradient, &mut hessian);
+            });
+            (value, gradient[1], hessian[1][1])
+        };
+        for part in [0.02, 0.05, 0.1, 0.2, 0.24, 0.26, 0.6, 0.9, 1.1] {
+            let (du, step) = (1e-3 * part, 1e-7 * part);
+            let [(low, slope_low, _), (high, slope_high, _)] =
+                [derivatives(du - step), derivatives(du + step)];
+            let (_, slope, curvature) = derivatives(du);
+            let differences = [(high - low), (slope_high - slope_low)].map(|d| d / (2.0 * step));
+            for (exact, difference) in [slope, curvature].into_iter().zip(differences) {
+                let error = (exact - difference).abs();
+                assert!(
+                    error <= 1e-5 * exact.abs() + 1e-12,
+                    "{part}: {exact} {difference}"
+                );
+            }
+        }
+        assert!(derivatives(1e-9).1 < 1e4 * derivatives(1e-6).1);
+        assert_eq!(derivatives(0.0).0, f64::INFINITY);
+    }
+}
