@@ -122,9 +122,13 @@ impl Workers {
         F: Fn(usize) -> f64 + Sync + Send,
     {
         const CHUNK: usize = 1024;
+        let part = |c: usize| (c * CHUNK..((c + 1) * CHUNK).min(count)).map(&f).sum();
+        if self.pool().is_none() {
+            return (0..count.div_ceil(CHUNK)).map(part).sum();
+        }
         let mut partial = vec![0.0; count.div_ceil(CHUNK)];
         self.chunks(&mut partial, 1, |c, out| {
-            out[0] = (c * CHUNK..((c + 1) * CHUNK).min(count)).map(&f).sum();
+            out[0] = part(c);
         });
         partial.iter().sum()
     }

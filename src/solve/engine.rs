@@ -111,8 +111,7 @@ impl Engine {
         self.system.set_options(&settings.into())?;
         self.settings = settings.clone();
         if self.linear.is_matrix_free() == self.assembler.is_of_diagonal() {
-            self.assembler
-                .rebuild(&self.system.widths(), &self.system.terms, &self.workers);
+            self.assembler.outdate(true);
         } else {
             self.assembler = assembler(&self.system, self.linear.as_ref());
         }
@@ -126,17 +125,14 @@ impl Engine {
             ..(&self.settings).into()
         };
         self.system.set_options(&options)?;
-        self.assembler
-            .rebuild(&self.system.widths(), &self.system.terms, &self.workers);
+        self.assembler.outdate(true);
         Ok(())
     }
 
     /// Takes the contacts that a state's yarns are in and where they slide.
     pub fn take_contacts(&mut self, state: &State) -> Result<()> {
-        if self.system.take_contacts(state)? {
-            self.assembler
-                .rebuild(&self.system.widths(), &self.system.terms, &self.workers);
-        }
+        let changed = self.system.take_contacts(state)?;
+        self.assembler.outdate(changed);
         Ok(())
     }
 
@@ -239,15 +235,12 @@ impl Engine {
                 inv_dt,
                 world: &world,
             };
-            let mut changed = false;
             for term in &mut system.terms {
-                changed |= term.begin_step(state, &at);
-            }
-            if changed {
-                self.assembler
-                    .rebuild(&system.widths(), &system.terms, &self.workers);
+                self.assembler.outdate(term.begin_step(state, &at));
             }
         }
+        self.assembler
+            .refresh(|| system.widths(), &system.terms, &self.workers);
         let problem = Problem {
             terms: &system.terms,
             world: &world,
@@ -407,10 +400,8 @@ impl Engine {
         system.unpack(&self.start, &x, h, state);
         if !matches!(motion, Motion::Relax { follow: false, .. }) {
             // the forces of a relaxation are not those of a motion: yarns come out of contacts in time only
-            if system.follow_contacts(dynamic, state, &self.workers)? {
-                self.assembler
-                    .rebuild(&system.widths(), &system.terms, &self.workers);
-            }
+            let changed = system.follow_contacts(dynamic, state, &self.workers)?;
+            self.assembler.outdate(changed);
         }
         system.bodies.accept(state);
         Ok(Attempt::Accepted(summary))

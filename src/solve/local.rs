@@ -37,6 +37,8 @@ const MOST: usize = 5;
 const DONE: f64 = 1e-2;
 /// Shortest correction of a group.
 const SHORTEST: f64 = 1e-4;
+/// Blocks of one task that looks for the worst.
+const CHUNK: usize = 2_048;
 /// Place of a block that is in no group.
 const NOWHERE: u32 = u32::MAX;
 
@@ -46,12 +48,16 @@ pub(super) struct Local {
     starts: Vec<u32>,
     /// Number of the term and of its stencil.
     stencils: Vec<(u16, u32)>,
+    /// What every block could still lose by itself [J].
+    energies: Vec<f64>,
 }
 
 /// Blocks that are solved for together, in the order of their unknowns, and the stencils that they are in.
 struct Group {
     blocks: Vec<u32>,
     stencils: Vec<(u16, u32)>,
+    /// What `Phi` has lost by it [J].
+    gain: f64,
 }
 
 /// Groups of one task, with positions of all blocks and the place of each in its group.
@@ -71,7 +77,9 @@ impl Local {
 
     /// Bytes held.
     pub(super) fn bytes(&self) -> usize {
-        size_of_val(&self.starts[..]) + size_of_val(&self.stencils[..])
+        size_of_val(&self.starts[..])
+            + size_of_val(&self.stencils[..])
+            + size_of_val(&self.energies[..])
     }
 
     fn know(&mut self, terms: &[Box<dyn Term>], n: usize) {
@@ -105,17 +113,16 @@ impl Local {
         &self.stencils[self.starts[block] as usize..self.starts[block + 1] as usize]
     }
 
-    /// Lowers `Phi` by the worst blocks; `matrix` was assembled nearby, `gradient` is that at `x`. False where nothing
-    /// was tried.
+    /// Lowers `Phi` by the worst blocks, and tells by how much; `matrix` was assembled nearby, `gradient` is that at `x`.
     pub(super) fn settle(
         &mut self,
         problem: &Problem<'_>,
         matrix: &BlockMatrix,
         gradient: &[Vec3],
         x: &mut [Vec3],
-    ) -> bool {
-        let Some(worst) = worst(matrix, gradient) else {
-            return false;
+    ) -> f64 {
+        let Some(worst) = self.worst(problem.workers, matrix, gradient) else {
+            return 0.0;
         };
         let n = x.len();
         if self.starts.len() != n + 1 {
@@ -145,16 +152,64 @@ impl Local {
             } in tasks
             {
                 for group in groups {
-                    group.minimise(problem, &matrix.pattern, place, x);
+                    group.gain = group.minimise(problem, &matrix.pattern, place, x);
                 }
             }
         });
+        let mut gains = Vec::new();
         for task in &tasks {
-            for b in task.groups.iter().flat_map(|group| &group.blocks) {
-                x[*b as usize] = task.x[*b as usize];
+            for group in &task.groups {
+                gains.push((group.blocks[0], group.gain));
+                for b in &group.blocks {
+                    x[*b as usize] = task.x[*b as usize];
+                }
             }
         }
-        true
+        // one order for any number of threads
+        gains.sort_unstable_by_key(|(block, _)| *block);
+        gains.iter().map(|(_, gain)| gain).sum()
+    }
+
+    /// The blocks that hold nearly all of the energy left, none if they are many.
+    fn worst(
+        &mut self,
+        workers: &Workers,
+        matrix: &BlockMatrix,
+        gradient: &[Vec3],
+    ) -> Option<Vec<u32>> {
+        self.energies.resize(gradient.len(), 0.0);
+        workers.chunks(&mut self.energies, CHUNK, |c, energies| {
+            for (i, energy) in (c * CHUNK..).zip(energies) {
+                let (diagonal, g) = (
+                    matrix.blocks[matrix.pattern.starts[i] as usize],
+                    gradient[i],
+                );
+                let factor = (g != Vec3::zeros()).then(|| diagonal.cholesky()).flatten();
+                *energy = factor.map_or(0.0, |factor| 0.5 * g.dot(&factor.solve(&g)));
+            }
+        });
+        let all: f64 = self.energies.iter().sum();
+        let mut energies: Vec<(f64, u32)> = (self.energies.iter().copied().zip(0..))
+            .filter(|(energy, _)| *energy != 0.0)
+            .collect();
+        let few = energies.len().min((FEW * gradient.len() as f64) as usize);
+        if few == 0 || !all.is_finite() {
+            return None;
+        }
+        let order = |a: &(f64, u32), b: &(f64, u32)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
+        energies.select_nth_unstable_by(few - 1, order);
+        energies.truncate(few);
+        energies.sort_unstable_by(order);
+        let mut left = all;
+        let mut out = Vec::new();
+        for (energy, block) in energies {
+            if left <= OUTSIDE * all {
+                break;
+            }
+            left -= energy;
+            out.push(block);
+        }
+        (left <= MUCH * all).then_some(out)
     }
 
     /// Takes neighbours into `blocks` and finds groups that share no stencil; `place` is [`NOWHERE`] at every
@@ -201,44 +256,14 @@ impl Local {
             }
             stencils.sort_unstable();
             stencils.dedup();
-            groups.push(Group { blocks, stencils });
+            groups.push(Group {
+                blocks,
+                stencils,
+                gain: 0.0,
+            });
         }
         groups
     }
-}
-
-/// The blocks that hold nearly all of the energy left, none if they are many.
-fn worst(matrix: &BlockMatrix, gradient: &[Vec3]) -> Option<Vec<u32>> {
-    let mut energies = Vec::new();
-    let mut all = 0.0;
-    for (i, g) in gradient.iter().enumerate() {
-        let diagonal = matrix.blocks[matrix.pattern.starts[i] as usize];
-        if *g != Vec3::zeros()
-            && let Some(factor) = diagonal.cholesky()
-        {
-            let energy = 0.5 * g.dot(&factor.solve(g));
-            all += energy;
-            energies.push((energy, i as u32));
-        }
-    }
-    let few = energies.len().min((FEW * gradient.len() as f64) as usize);
-    if few == 0 || !all.is_finite() {
-        return None;
-    }
-    let order = |a: &(f64, u32), b: &(f64, u32)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
-    energies.select_nth_unstable_by(few - 1, order);
-    energies.truncate(few);
-    energies.sort_unstable_by(order);
-    let mut left = all;
-    let mut out = Vec::new();
-    for (energy, block) in energies {
-        if left <= OUTSIDE * all {
-            break;
-        }
-        left -= energy;
-        out.push(block);
-    }
-    (left <= MUCH * all).then_some(out)
 }
 
 impl Group {
@@ -321,30 +346,34 @@ impl Group {
         complete(matrix);
     }
 
-    /// Newton's method by the blocks of the group; `place` is [`NOWHERE`] at every block, before and after.
+    /// Newton's method by the blocks of the group; what it gains [J]. `place` is [`NOWHERE`] at every block, before and after.
     fn minimise(
         &self,
         problem: &Problem<'_>,
         whole: &BlockPattern,
         place: &mut [u32],
         x: &mut [Vec3],
-    ) {
+    ) -> f64 {
         for (k, b) in self.blocks.iter().enumerate() {
             place[*b as usize] = k as u32;
         }
-        self.corrections(problem, whole, place, x);
+        let start = self.value(problem, x);
+        let end = self.corrections(start, problem, whole, place, x);
         for b in &self.blocks {
             place[*b as usize] = NOWHERE;
         }
+        start - end
     }
 
+    /// From `value` on; the value at the end.
     fn corrections(
         &self,
+        mut value: f64,
         problem: &Problem<'_>,
         whole: &BlockPattern,
         place: &[u32],
         x: &mut [Vec3],
-    ) {
+    ) -> f64 {
         let n = self.blocks.len();
         let mut pattern = BlockPattern::from_stencils(n, |sink| {
             let mut inside = Vec::new();
@@ -363,7 +392,6 @@ impl Group {
         let mut solver = Direct::new(&Workers::default());
         let zeros = vec![Vec3::zeros(); n];
         let (mut force, mut direction, mut start) = (zeros.clone(), zeros.clone(), zeros);
-        let mut value = self.value(problem, x);
         let (mut exactness, mut promised) = (0.0, 0.0);
         for count in 0..MOST {
             loop {
@@ -379,7 +407,7 @@ impl Group {
                     Ok(_) => break,
                     Err(_) if exactness > 0.0 => exactness = 0.0,
                     // what ails this matrix, the next one of all blocks has too and tells of it
-                    Err(_) => return,
+                    Err(_) => return value,
                 }
             }
             let gain: f64 = force.iter().zip(&direction).map(|(f, d)| f.dot(d)).sum();
@@ -387,7 +415,7 @@ impl Group {
                 promised = gain;
             }
             if gain.is_nan() || gain <= DONE * promised {
-                return;
+                return value;
             }
             for (start, b) in start.iter_mut().zip(&self.blocks) {
                 *start = x[*b as usize];
@@ -407,10 +435,11 @@ impl Group {
                     for (start, b) in start.iter().zip(&self.blocks) {
                         x[*b as usize] = *start;
                     }
-                    return;
+                    return value;
                 }
             }
             exactness = if length < 1.0 { 0.0 } else { ALMOST };
         }
+        value
     }
 }

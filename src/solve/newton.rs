@@ -487,9 +487,7 @@ impl Problem<'_> {
                         trial: at,
                         ..
                     } = &mut *work;
-                    if local.settle(self, matrix, negative, at) {
-                        trial = self.value(at);
-                    }
+                    trial -= local.settle(self, matrix, negative, at);
                 }
                 if trial <= most {
                     if tolerance.motion > 0.0 {
@@ -549,9 +547,7 @@ impl Problem<'_> {
             if settles && iteration + 1 < tolerance.iterations {
                 self.slope(x, assembler, &mut work.negative);
                 let matrix = assembler.matrix();
-                if work.local.settle(self, matrix, &work.negative, x) {
-                    value = self.value(x);
-                }
+                value -= work.local.settle(self, matrix, &work.negative, x);
             }
         }
         Ok(summary)

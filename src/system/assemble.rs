@@ -59,6 +59,8 @@ pub struct Assembler {
     matrix: BlockMatrix,
     /// Per term, per batch of stencils.
     plans: Vec<Vec<Plan>>,
+    /// Whether stencils have changed since.
+    outdated: bool,
     spreads: Spreads,
     riders: Riders,
     /// Whether the matrix has its diagonal blocks alone.
@@ -82,6 +84,7 @@ impl Assembler {
         let mut assembler = Self {
             matrix: BlockMatrix::zeros(BlockPattern::from_stencils(0, |_| {})),
             plans: Vec::new(),
+            outdated: false,
             spreads: Spreads::default(),
             riders: riders.clone(),
             diagonal,
@@ -92,8 +95,25 @@ impl Assembler {
         assembler
     }
 
-    /// Takes changed stencils. The pattern changes only where a new coupling asks for it.
-    pub fn rebuild(&mut self, widths: &[u8], terms: &[Box<dyn Term>], workers: &Workers) {
+    /// Tells whether stencils or widths have changed.
+    pub fn outdate(&mut self, changed: bool) {
+        self.outdated |= changed;
+    }
+
+    /// Takes changed stencils and `widths` if there are any.
+    pub fn refresh(
+        &mut self,
+        widths: impl FnOnce() -> Vec<u8>,
+        terms: &[Box<dyn Term>],
+        workers: &Workers,
+    ) {
+        if std::mem::take(&mut self.outdated) {
+            self.rebuild(&widths(), terms, workers);
+        }
+    }
+
+    /// The pattern changes only where a new coupling asks for it.
+    fn rebuild(&mut self, widths: &[u8], terms: &[Box<dyn Term>], workers: &Workers) {
         let riders = &self.riders;
         let diagonal = self.diagonal;
         let mut pattern = BlockPattern::from_stencils(widths.len(), |sink| {

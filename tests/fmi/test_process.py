@@ -189,7 +189,7 @@ def test_c_master_over_the_official_headers(fmu, tmp_path):
 
 
 def test_a_thousand_cycles_leak_nothing(fmu, tmp_path):
-    """Load, step, save, restore, unload: what is allocated at the end is what was after 100 cycles."""
+    """Load, step, save, restore, unload: what is allocated in the last 100 cycles is what was in the second 100."""
     program = build(tmp_path)
     done = subprocess.run([program, *arguments(fmu, 1000)], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

@@ -19,6 +19,9 @@ impl Engine {
             for pin in &state.pins {
                 engine.fixed[pin.vertex as usize] = true;
             }
+            let system = &engine.system;
+            let widths = || system.widths();
+            (engine.assembler).refresh(widths, &system.terms, &engine.workers);
             let problem = Problem {
                 terms: &engine.system.terms,
                 world: at.world,
@@ -51,7 +54,8 @@ impl Engine {
                 term.accept(at, state);
             }
             let workers = engine.workers.clone();
-            engine.system.follow_contacts(false, state, &workers)?;
+            let changed = engine.system.follow_contacts(false, state, &workers)?;
+            engine.assembler.outdate(changed);
             Ok(())
         })?
     }
@@ -78,6 +82,9 @@ impl Engine {
     pub fn forces(&mut self, state: &State) -> Result<Vec<Vec3>> {
         self.with_present(state, |engine, at| {
             let mut gradient = vec![Vec3::zeros(); at.x.len()];
+            let system = &engine.system;
+            let widths = || system.widths();
+            (engine.assembler).refresh(widths, &system.terms, &engine.workers);
             engine.assembler.add(
                 &engine.system.terms,
                 at,
@@ -109,7 +116,7 @@ impl Engine {
             body.target = body.pose;
             body.target_vertices.clear();
         }
-        let mut changed = self.system.take_contacts(state)?;
+        self.take_contacts(state)?;
         self.system.bodies.prepare(&still, 1.0, &self.workers)?;
         let bodies = self.system.bodies.clone();
         let world = World {
@@ -128,11 +135,7 @@ impl Engine {
             world: &world,
         };
         for term in &mut self.system.terms {
-            changed |= term.begin_step(state, &at);
-        }
-        if changed {
-            self.assembler
-                .rebuild(&self.system.widths(), &self.system.terms, &self.workers);
+            self.assembler.outdate(term.begin_step(state, &at));
         }
         Ok(f(self, &at))
     }

@@ -14,7 +14,8 @@
 
 use super::LinearError;
 use super::fronts::{Entry, Fronts, Source};
-use super::substitution::Substitution;
+use super::substitution::{Factor, Substitution};
+use super::tiles::{Right, SIDE, Shape, Tiles};
 use super::tree::{Tree, columns, panel, place, postorder};
 use crate::math::block::{BlockMatrix, BlockPattern};
 use crate::math::parallel::Workers;
@@ -28,9 +29,12 @@ use faer::sparse::linalg::cholesky::{
     factorize_symbolic_cholesky, supernodal,
 };
 use faer::traits::RealField;
-use faer::{Conj, Mat, Par, Side};
-use pulp::Simd;
+use faer::{Mat, Side};
 use std::ops::{Add, AddAssign, Div, Mul, MulAssign, Range, Sub, SubAssign};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Rows of one task that permutes.
+const ROWS: usize = 4_096;
 
 /// A precision to factor in.
 pub(super) trait Number:
@@ -47,91 +51,63 @@ pub(super) trait Number:
     + MulAssign
     + Default
 {
+    /// What a factor keeps of a number.
+    type Stored: Copy + Default + Send + Sync;
     /// Distance from 1 to the next number.
     const EPSILON: f64;
     /// The nearest number.
     fn of(value: f64) -> Self;
-    /// Inner products of columns with `x`, all of one length.
-    fn dots<S: Simd, const K: usize>(simd: S, columns: [&[Self]; K], x: &[Self]) -> [Self; K];
+    /// What is kept of a number.
+    fn stored(self) -> Self::Stored;
+    /// What was kept.
+    fn loaded(stored: Self::Stored) -> Self;
 }
 
-macro_rules! number {
-    ($number:ty, $split:ident, $splat:ident, $fused:ident, $add:ident, $sum:ident) => {
-        impl Number for $number {
-            const EPSILON: f64 = <$number>::EPSILON as f64;
-            fn of(value: f64) -> Self {
-                value as $number
-            }
-            #[inline(always)]
-            fn dots<S: Simd, const K: usize>(
-                simd: S,
-                columns: [&[Self]; K],
-                x: &[Self],
-            ) -> [Self; K] {
-                let (x, rest) = S::$split(x);
-                let (pairs, last) = x.as_chunks::<2>();
-                // closures would not be compiled for the instructions of `simd`
-                let mut parts = [S::$split(columns[0]); K];
-                let mut whole = [&parts[0].0.as_chunks::<2>().0[..pairs.len()]; K];
-                for k in 0..K {
-                    parts[k] = S::$split(columns[k]);
-                    whole[k] = &parts[k].0.as_chunks::<2>().0[..pairs.len()];
-                }
-                // two strands for each column: a sum waits for the one before
-                let mut sums = [[simd.$splat(0.0); 2]; K];
-                for (i, x) in pairs.iter().enumerate() {
-                    for k in 0..K {
-                        let column = &whole[k][i];
-                        sums[k] = [
-                            simd.$fused(column[0], x[0], sums[k][0]),
-                            simd.$fused(column[1], x[1], sums[k][1]),
-                        ];
-                    }
-                }
-                if let [x] = last {
-                    for k in 0..K {
-                        sums[k][0] = simd.$fused(parts[k].0[2 * pairs.len()], *x, sums[k][0]);
-                    }
-                }
-                let mut out = [0.0; K];
-                for k in 0..K {
-                    out[k] = simd.$sum(simd.$add(sums[k][0], sums[k][1]));
-                }
-                for (i, x) in rest.iter().enumerate() {
-                    for k in 0..K {
-                        out[k] += parts[k].1[i] * x;
-                    }
-                }
-                out
-            }
-        }
-    };
+impl Number for f64 {
+    type Stored = Self;
+    const EPSILON: f64 = Self::EPSILON;
+    fn of(value: f64) -> Self {
+        value
+    }
+    #[inline(always)]
+    fn stored(self) -> Self {
+        self
+    }
+    #[inline(always)]
+    fn loaded(stored: Self) -> Self {
+        stored
+    }
 }
 
-number!(
-    f64,
-    as_simd_f64s,
-    splat_f64s,
-    mul_add_e_f64s,
-    add_f64s,
-    reduce_sum_f64s
-);
-number!(
-    f32,
-    as_simd_f32s,
-    splat_f32s,
-    mul_add_e_f32s,
-    add_f32s,
-    reduce_sum_f32s
-);
+/// Factors in f32 are preconditioners, which are read in every iteration and need be no more than near: of most numbers the upper 16
+/// bits are kept, eight of them the mantissa's (bfloat16).
+impl Number for f32 {
+    type Stored = u16;
+    const EPSILON: f64 = Self::EPSILON as f64;
+    fn of(value: f64) -> Self {
+        value as Self
+    }
+    #[inline(always)]
+    fn stored(self) -> u16 {
+        // rounded to even; only a NaN could overflow, which pivots do not let through
+        let bits = self.to_bits();
+        (bits.wrapping_add(0x7fff + (bits >> 16 & 1)) >> 16) as u16
+    }
+    #[inline(always)]
+    fn loaded(stored: u16) -> Self {
+        Self::from_bits(u32::from(stored) << 16)
+    }
+}
 
 /// What depends on the pattern, and memory of the sizes it asks for.
-pub(super) struct Cholesky<T> {
+pub(super) struct Cholesky<T: Number> {
     pattern: BlockPattern,
     /// New place of each block row.
     place: Vec<u32>,
     /// First scalar of each permuted block row, and their number.
     offsets: Vec<u32>,
+    /// Row, by scalars of all blocks, of each permuted unknown.
+    rows: Vec<u32>,
     /// Blocks of the permuted lower triangle, column by column.
     entries: Vec<Entry>,
     /// Start of each permuted block column in `entries`.
@@ -139,7 +115,7 @@ pub(super) struct Cholesky<T> {
     symbolic: SymbolicCholesky<u32>,
     tree: Tree,
     fronts: Fronts<T>,
-    factor: Vec<T>,
+    tiles: Tiles<T>,
     rhs: Vec<T>,
     substitution: Substitution<T>,
 }
@@ -175,6 +151,12 @@ impl<T: Number> Cholesky<T> {
         }
         for p in 0..n {
             offsets[p + 1] += offsets[p];
+        }
+        let mut rows = vec![0; offsets[n] as usize];
+        for (j, p) in (0..).zip(&place) {
+            for (row, to) in (3 * j..).zip(&mut rows[scalars(&offsets, *p)]) {
+                *to = row;
+            }
         }
 
         // Permuted block columns of the lower triangle, each sorted by rows; at first with the rows themselves.
@@ -228,21 +210,28 @@ impl<T: Number> Cholesky<T> {
                 .map_err(|_| LinearError::NoConvergence)?
         };
         let (mut tree, mut fronts, mut substitution) = Default::default();
+        let mut tiles = Tiles::default();
         // faer has no supernodes of an empty matrix
         if count > 0 {
             let nodes = supernodal(&symbolic)?;
             place_in_fronts(nodes, &offsets, &starts, &mut entries);
             tree = Tree::new(nodes)?;
             fronts = Fronts::new(nodes, &tree);
-            substitution = Substitution::new(nodes, &tree);
+            let shapes = (0..nodes.n_supernodes()).map(|s| Shape {
+                width: columns(nodes, s).len(),
+                below: panel(nodes, s).0.len(),
+            });
+            tiles = Tiles::new(shapes.collect())?;
+            substitution = Substitution::new(nodes, &tree, &tiles);
         }
         Ok(Self {
             pattern: pattern.clone(),
             place,
             offsets,
+            rows,
             entries,
             starts,
-            factor: vec![T::of(0.0); symbolic.len_val()],
+            tiles,
             rhs: vec![T::of(0.0); count],
             fronts,
             substitution,
@@ -277,7 +266,7 @@ impl<T: Number> Cholesky<T> {
             starts: &self.starts,
             entries: &self.entries,
         };
-        self.fronts.factorize(&source, &mut self.factor, workers)
+        self.fronts.factorize(&source, &mut self.tiles, workers)
     }
 
     /// Solves with the factor.
@@ -290,69 +279,39 @@ impl<T: Number> Cholesky<T> {
         if b.is_empty() {
             return Ok(());
         }
-        for (b, &p) in b.iter().zip(&self.place) {
-            for (x, b) in self.rhs[scalars(&self.offsets, p)].iter_mut().zip(b) {
-                *x = T::of(*b);
+        let (rows, offsets, place) = (&self.rows, &self.offsets, &self.place);
+        workers.chunks(&mut self.rhs, ROWS, |c, rhs| {
+            for (x, row) in rhs.iter_mut().zip(&rows[c * ROWS..]) {
+                *x = T::of(b[*row as usize / 3][*row as usize % 3]);
             }
-        }
-        self.substitution.solve(
-            supernodal(&self.symbolic)?,
-            &self.factor,
-            &mut self.rhs,
-            workers,
-        );
-        for ((x, b), &p) in x.iter_mut().zip(b).zip(&self.place) {
-            // what is no unknown has the row of the identity
-            *x = *b;
-            for (x, solved) in x.iter_mut().zip(&self.rhs[scalars(&self.offsets, p)]) {
-                *x = (*solved).into();
+        });
+        let factor = Factor {
+            symbolic: supernodal(&self.symbolic)?,
+            tiles: &self.tiles,
+        };
+        self.substitution.solve(factor, &mut self.rhs, workers);
+        let (rhs, finite) = (&self.rhs, AtomicBool::new(true));
+        workers.chunks(x, ROWS, |c, x| {
+            for (i, x) in (c * ROWS..).zip(x) {
+                // what is no unknown has the row of the identity
+                *x = b[i];
+                for (x, solved) in x.iter_mut().zip(&rhs[scalars(offsets, place[i])]) {
+                    *x = (*solved).into();
+                }
+                if !x.iter().all(|v| v.is_finite()) {
+                    finite.store(false, Ordering::Relaxed);
+                }
             }
-            if !x.iter().all(|v| v.is_finite()) {
-                return Err(LinearError::NoConvergence);
-            }
+        });
+        if !finite.into_inner() {
+            return Err(LinearError::NoConvergence);
         }
         Ok(())
     }
 
-    /// Solves with the factor for sparse right-hand sides of `(scalar row, value)`, in columns; on this thread.
-    pub(super) fn solve_columns(&self, right: &[Vec<(u32, f64)>]) -> Mat<f64>
-    where
-        T: RealField,
-    {
-        let mut permuted = Mat::<T>::zeros(self.rhs.len(), right.len());
-        let place = |i: usize| scalars(&self.offsets, self.place[i / 3]).nth(i % 3);
-        let mut out = Mat::zeros(3 * self.place.len(), right.len());
-        for (k, column) in right.iter().enumerate() {
-            for (i, value) in column {
-                match place(*i as usize) {
-                    Some(i) => permuted[(i, k)] = T::of(*value),
-                    None => out[(*i as usize, k)] = *value,
-                }
-            }
-        }
-        if let SymbolicCholeskyRaw::Supernodal(symbolic) = self.symbolic.raw() {
-            let need = symbolic.solve_in_place_scratch::<T>(right.len(), Par::Seq);
-            let mut memory = MemBuffer::new(need);
-            supernodal::SupernodalLltRef::new(symbolic, &self.factor).solve_in_place_with_conj(
-                Conj::No,
-                permuted.as_mut(),
-                Par::Seq,
-                MemStack::new(&mut memory),
-            );
-        }
-        for i in 0..out.nrows() {
-            if let Some(place) = place(i) {
-                for k in 0..right.len() {
-                    out[(i, k)] = permuted[(place, k)].into();
-                }
-            }
-        }
-        out
-    }
-
-    /// Stored numbers of the factor, padding of supernodes included.
+    /// Stored numbers of the factor, zeros that fill tiles up included.
     pub(super) fn factor_length(&self) -> usize {
-        self.factor.len()
+        self.tiles.len()
     }
 
     /// Block rows.
@@ -362,19 +321,55 @@ impl<T: Number> Cholesky<T> {
 
     /// Bytes held.
     pub(super) fn bytes(&self) -> usize {
-        let numbers = self.factor.len() + self.rhs.len();
-        let indices = self.place.len() + self.offsets.len() + self.starts.len();
+        let indices = self.place.len() + self.offsets.len() + self.rows.len() + self.starts.len();
         let symbolic = match self.symbolic.raw() {
             SymbolicCholeskyRaw::Supernodal(s) => s.row_idx().len() + 4 * s.n_supernodes(),
             SymbolicCholeskyRaw::Simplicial(s) => s.row_idx().len() + s.nrows(),
         };
         let pattern = self.pattern.rows.len() + self.pattern.starts.len();
-        size_of::<T>() * numbers
+        size_of::<T>() * self.rhs.len()
+            + self.tiles.bytes()
             + 4 * (indices + symbolic + pattern)
             + size_of::<Entry>() * self.entries.len()
             + self.tree.bytes()
             + self.fronts.bytes()
             + self.substitution.bytes()
+    }
+}
+
+impl Cholesky<f64> {
+    /// Solves with the factor for sparse right-hand sides of `(scalar row, value)`, in columns; on this thread.
+    pub(super) fn solve_columns(&self, right: &[Vec<(u32, f64)>]) -> Result<Mat<f64>, LinearError> {
+        let mut out = Mat::zeros(3 * self.place.len(), right.len());
+        if self.place.is_empty() {
+            return Ok(out);
+        }
+        let factor = Factor {
+            symbolic: supernodal(&self.symbolic)?,
+            tiles: &self.tiles,
+        };
+        let place = |i: usize| scalars(&self.offsets, self.place[i / 3]).nth(i % 3);
+        let mut permuted: Vec<Right<f64>> = vec![[0.0; SIDE]; self.rhs.len()];
+        for (g, group) in right.chunks(SIDE).enumerate() {
+            permuted.fill([0.0; SIDE]);
+            for (k, column) in group.iter().enumerate() {
+                for (i, value) in column {
+                    match place(*i as usize) {
+                        Some(i) => permuted[i][k] = *value,
+                        None => out[(*i as usize, SIDE * g + k)] = *value,
+                    }
+                }
+            }
+            factor.solve_all(&mut permuted);
+            for i in 0..out.nrows() {
+                if let Some(place) = place(i) {
+                    for k in 0..group.len() {
+                        out[(i, SIDE * g + k)] = permuted[place][k];
+                    }
+                }
+            }
+        }
+        Ok(out)
     }
 }
 

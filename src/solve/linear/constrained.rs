@@ -226,7 +226,11 @@ impl Constrained {
             .chunks(&mut schur, BATCH * width.max(1), |batch, chunk| {
                 let from = batch * BATCH;
                 let count = chunk.len() / width;
-                let solved = cholesky.solve_columns(&columns[from..from + count]);
+                let Ok(solved) = cholesky.solve_columns(&columns[from..from + count]) else {
+                    // refused below: an entry is not finite
+                    chunk.fill(f64::NAN);
+                    return;
+                };
                 for (k, out) in chunk.chunks_mut(width).enumerate() {
                     for (row, entry) in out.iter_mut().enumerate() {
                         let by: f64 = (columns[row].iter())

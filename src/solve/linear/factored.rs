@@ -2,7 +2,8 @@
 //!
 //! Newton's method meets a series of matrices that change little. Conjugate gradients with the
 //! factor of an earlier one need a handful of iterations, each at a tenth of the price of a new
-//! factor; single precision halves that price again and costs an iteration or two.
+//! factor. Of most of its numbers 16 bits are kept: a quarter of f64's memory, and of jersey in
+//! motion as many iterations as with the whole factor in f32.
 
 use super::cholesky::Cholesky;
 use super::pcg::Preconditioner;

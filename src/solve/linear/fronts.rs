@@ -12,6 +12,7 @@
 
 use super::LinearError;
 use super::cholesky::Number;
+use super::tiles::{Rest, Tiles};
 use super::tree::{Tree, columns, panel, place, rows};
 use crate::math::Mat3;
 use crate::math::parallel::Workers;
@@ -69,26 +70,29 @@ pub(super) struct Fronts<T> {
 /// What the supernodes of a subtree leave to those above, one after the other.
 struct Stack<T> {
     left: Vec<T>,
-    /// Numbers that it takes at most.
+    /// Numbers that it takes at most, and those of them that are for what is above.
     most: usize,
+    root: usize,
+    /// The panel of a front.
+    panel: Vec<T>,
     /// Diagonal of a front before anything is taken from it.
     diagonal: Vec<T>,
     done: Result<(), LinearError>,
 }
 
 /// A subtree at work.
-struct Task<'a, T> {
+struct Task<'a, T: Number> {
     nodes: Range<usize>,
     stack: &'a mut Stack<T>,
-    values: &'a mut [T],
+    kept: Rest<'a, T>,
 }
 
 /// A supernode above the subtrees at work.
-struct Top<'a, T> {
+struct Top<'a, T: Number> {
     s: usize,
     /// What the children leave.
     given: Vec<(usize, Vec<T>)>,
-    values: &'a mut [T],
+    kept: Rest<'a, T>,
     left: Vec<T>,
     done: Result<(), LinearError>,
 }
@@ -122,6 +126,8 @@ impl<T: Number> Fronts<T> {
             Stack {
                 left: Vec::new(),
                 most,
+                root: nodes.clone().last().map_or(0, left),
+                panel: Vec::new(),
                 diagonal: Vec::new(),
                 done: Ok(()),
             }
@@ -132,15 +138,14 @@ impl<T: Number> Fronts<T> {
         }
     }
 
-    /// Factors into `values`, the panels of the supernodes.
+    /// Factors into the tiles of all supernodes.
     pub(super) fn factorize<B: Fn(usize) -> Mat3 + Sync>(
         &mut self,
         source: &Source<'_, B>,
-        values: &mut [T],
+        tiles: &mut Tiles<T>,
         workers: &Workers,
     ) -> Result<(), LinearError> {
-        let Source { symbolic, tree, .. } = source;
-        let starts = symbolic.col_ptr_for_val();
+        let tree = source.tree;
         let relative = &self.relative;
         if tree.levels.is_empty()
             && let ([nodes], [stack]) = (&tree.subtrees[..], &mut self.stacks[..])
@@ -148,25 +153,27 @@ impl<T: Number> Fronts<T> {
             let mut whole = Task {
                 nodes: nodes.clone(),
                 stack,
-                values,
+                kept: tiles.rest(),
             };
             return whole.factorize(source, relative);
         }
+        let (mut rest, mut at) = (tiles.rest(), 0);
         let mut tasks = Vec::with_capacity(self.stacks.len());
-        let (mut rest, mut at) = (&mut *values, 0);
         for (nodes, stack) in tree.subtrees.iter().zip(&mut self.stacks) {
-            let [begin, end] = [nodes.start, nodes.end].map(|s| starts[s] as usize);
-            let (own, after) = std::mem::take(&mut rest)[begin - at..].split_at_mut(end - begin);
-            (rest, at) = (after, end);
+            rest.take(nodes.start - at);
+            at = nodes.end;
             tasks.push(Task {
                 nodes: nodes.clone(),
                 stack,
-                values: own,
+                kept: rest.take(nodes.len()),
             });
         }
         workers.chunks(&mut tasks, 1, |_, tasks| {
             for task in tasks {
                 task.stack.done = task.factorize(source, relative);
+                // of all subtrees at once there is only what they leave
+                task.stack.left.shrink_to_fit();
+                task.stack.panel = Vec::new();
             }
         });
         for stack in &self.stacks {
@@ -180,19 +187,17 @@ impl<T: Number> Fronts<T> {
             }
         }
         for level in &tree.levels {
-            let (mut rest, mut at) = (&mut *values, 0);
+            let (mut rest, mut at) = (tiles.rest(), 0);
             let fronts = level.iter().map(|&s| {
-                let place = panel(symbolic, s).1;
-                let (own, after) =
-                    std::mem::take(&mut rest)[place.start - at..].split_at_mut(place.len());
-                (rest, at) = (after, place.end);
+                rest.take(s - at);
+                at = s + 1;
                 let given: Vec<_> = (tree.children(s))
                     .map(|c| (c, std::mem::take(&mut left[c])))
                     .collect();
                 Top {
                     s,
                     given,
-                    values: own,
+                    kept: rest.take(1),
                     left: Vec::new(),
                     done: Ok(()),
                 }
@@ -211,10 +216,11 @@ impl<T: Number> Fronts<T> {
         Ok(())
     }
 
-    /// Bytes held while it factors.
+    /// Bytes held while it factors on one thread.
     pub(super) fn bytes(&self) -> usize {
-        let most: usize = self.stacks.iter().map(|stack| stack.most).sum();
-        4 * self.relative.len() + size_of::<T>() * most
+        let left: usize = self.stacks.iter().map(|stack| stack.root).sum();
+        let most = self.stacks.iter().map(|stack| stack.most).max();
+        4 * self.relative.len() + size_of::<T>() * (left + most.unwrap_or(0))
     }
 }
 
@@ -230,22 +236,24 @@ impl<T: Number> Top<'_, T> {
             columns(symbolic, self.s).len(),
             panel(symbolic, self.s).0.len(),
         );
-        let mut diagonal = Vec::new();
-        source.load(self.s, self.values, &mut diagonal)?;
+        let (mut panel, mut diagonal) = (Vec::new(), Vec::new());
+        source.load(self.s, &mut panel, &mut diagonal)?;
         self.left
             .try_reserve_exact(below * below)
             .map_err(|_| LinearError::NoConvergence)?;
         self.left.resize(below * below, T::of(0.0));
         for (child, given) in std::mem::take(&mut self.given) {
             let places = &relative[rows(symbolic, child)];
-            assemble(places, &given, (width, below), self.values, &mut self.left);
+            assemble(places, &given, (width, below), &mut panel, &mut self.left);
         }
         let front = Front {
             width,
             below,
             workers,
         };
-        front.eliminate(self.values, &mut self.left, &diagonal)
+        front.eliminate(&mut panel, &mut self.left, &diagonal)?;
+        self.kept.keep(&panel);
+        Ok(())
     }
 }
 
@@ -256,12 +264,11 @@ impl<T: Number> Task<'_, T> {
         relative: &[u32],
     ) -> Result<(), LinearError> {
         let Source { symbolic, tree, .. } = source;
-        let starts = symbolic.col_ptr_for_val();
         let alone = Workers::default();
-        let base = starts[self.nodes.start] as usize;
         let Stack {
             left,
             most,
+            panel: own,
             diagonal,
             ..
         } = &mut *self.stack;
@@ -269,10 +276,8 @@ impl<T: Number> Task<'_, T> {
         left.try_reserve_exact(*most)
             .map_err(|_| LinearError::NoConvergence)?;
         for s in self.nodes.clone() {
-            let place = panel(symbolic, s).1;
-            let values = &mut self.values[place.start - base..place.end - base];
             let (width, below) = (columns(symbolic, s).len(), panel(symbolic, s).0.len());
-            source.load(s, values, diagonal)?;
+            source.load(s, own, diagonal)?;
             let top = left.len();
             left.resize(top + below * below, T::of(0.0));
             let (given, update) = left.split_at_mut(top);
@@ -281,14 +286,15 @@ impl<T: Number> Task<'_, T> {
                 let places = &relative[rows(symbolic, child)];
                 let end = begin;
                 begin -= places.len().pow(2);
-                assemble(places, &given[begin..end], (width, below), values, update);
+                assemble(places, &given[begin..end], (width, below), own, update);
             }
             let front = Front {
                 width,
                 below,
                 workers: &alone,
             };
-            front.eliminate(values, update, diagonal)?;
+            front.eliminate(own, update, diagonal)?;
+            self.kept.keep(own);
             left.copy_within(top.., begin);
             left.truncate(begin + below * below);
         }
@@ -297,16 +303,17 @@ impl<T: Number> Task<'_, T> {
 }
 
 impl<B: Fn(usize) -> Mat3> Source<'_, B> {
-    /// Writes the columns of a supernode into its panel and tells their diagonal; refuses what is not finite.
+    /// The columns of a supernode as a panel, and their diagonal; refuses what is not finite.
     fn load<T: Number>(
         &self,
         s: usize,
-        values: &mut [T],
+        values: &mut Vec<T>,
         diagonal: &mut Vec<T>,
     ) -> Result<(), LinearError> {
         let inside = columns(self.symbolic, s);
         let height = inside.len() + panel(self.symbolic, s).0.len();
-        values.fill(T::of(0.0));
+        values.clear();
+        values.resize(inside.len() * height, T::of(0.0));
         diagonal.clear();
         let mut poison = 0.0;
         let first = self

@@ -1,7 +1,7 @@
 //! Linear systems `A x = b` with symmetric positive definite block-sparse `A`, behind one trait.
 //!
-//! * [`direct`]: [`cholesky`] by supernodes, ordered by approximate minimum degree on the block graph; [`fronts`] factor,
-//!   [`substitution`] solves, and both have the subtrees of the elimination [`tree`] side by side.
+//! * [`direct`]: [`cholesky`] by supernodes, ordered by approximate minimum degree on the block graph; [`fronts`] factor
+//!   into [`tiles`], [`substitution`] solves with these, and both have the subtrees of the elimination [`tree`] side by side.
 //! * [`pcg`]: conjugate gradients with a [`pcg::Preconditioner`]: [`jacobi`] (3x3 diagonal blocks),
 //!   [`ic0`] (incomplete Cholesky on the pattern of `A`, in an [`ordering`]), [`factored`] (the
 //!   complete factor of an earlier matrix, of its stiff part) or [`schwarz`] (factors of overlapping parts of the [`graph`]).
@@ -26,6 +26,7 @@ mod product;
 pub mod schwarz;
 mod stiff_part;
 mod substitution;
+mod tiles;
 mod tree;
 
 use crate::math::Vec3;

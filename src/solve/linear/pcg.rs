@@ -7,7 +7,7 @@
 //! so the true one is computed before the answer is given, and the iteration is restarted from it
 //! when it does not hold.
 //!
-//! A direction of negative curvature gives `NotPositiveDefinite`. Sums run over vertices in order,
+//! A direction of negative curvature gives `NotPositiveDefinite`. Sums are added in one order,
 //! so results do not depend on threads. No allocation while the size stays the same.
 
 use super::product::Multiplication;
@@ -54,6 +54,9 @@ struct Series {
     prepared: Option<BlockPattern>,
 }
 
+/// Rows of vectors that one task works on.
+const ROWS: usize = 4_096;
+
 /// Times that a drifted iteration is restarted from the true residual.
 const RESTARTS: u32 = 10;
 
@@ -67,6 +70,7 @@ pub struct ConjugateGradients {
     in_energy: bool,
     /// Whether matrices come by their diagonal blocks.
     matrix_free: bool,
+    workers: Workers,
     multiplication: Multiplication,
     r: Vec<Vec3>,
     z: Vec<Vec3>,
@@ -83,6 +87,7 @@ impl ConjugateGradients {
             series: None,
             in_energy: false,
             matrix_free: false,
+            workers: Workers::default(),
             multiplication: Multiplication::default(),
             r: Vec::new(),
             z: Vec::new(),
@@ -125,9 +130,10 @@ impl ConjugateGradients {
         self
     }
 
-    /// The same that multiplies on these threads.
+    /// The same on these threads.
     #[must_use]
     pub fn on(mut self, workers: &Workers) -> Self {
+        self.workers = workers.clone();
         self.multiplication = Multiplication::new(workers);
         self
     }
@@ -258,6 +264,17 @@ impl LinearSolver for ConjugateGradients {
 }
 
 impl ConjugateGradients {
+    fn dot(&self, a: &[Vec3], b: &[Vec3]) -> f64 {
+        let alone = Workers::default();
+        // waking a thread takes longer than a short sum
+        let workers = if a.len() > 2 * ROWS {
+            &self.workers
+        } else {
+            &alone
+        };
+        workers.sum(a.len(), |i| a[i].dot(&b[i]))
+    }
+
     /// The next matrix is prepared anew.
     fn discard(&mut self) {
         if let Some(series) = &mut self.series {
@@ -277,8 +294,8 @@ impl ConjugateGradients {
     ) -> Result<(), LinearError> {
         self.preconditioner.apply(product, &self.r, &mut self.z);
         self.p.copy_from_slice(&self.z);
-        let mut rz = dot(&self.r, &self.z);
-        let mut rr = dot(&self.r, &self.r);
+        let mut rz = self.dot(&self.r, &self.z);
+        let mut rr = self.dot(&self.r, &self.r);
         let (mut whole, mut last) = (0.0, [f64::INFINITY; 2]);
         while rr > goal && last[0] + last[1] > gained * whole {
             if *iterations >= limit {
@@ -286,7 +303,7 @@ impl ConjugateGradients {
             }
             *iterations += 1;
             product(&self.p, &mut self.q);
-            let curvature = dot(&self.p, &self.q);
+            let curvature = self.dot(&self.p, &self.q);
             if curvature.is_nan() || rz.is_nan() {
                 return Err(LinearError::NoConvergence);
             }
@@ -299,19 +316,26 @@ impl ConjugateGradients {
             let alpha = rz / curvature;
             whole += alpha * rz;
             last = [last[1], alpha * rz];
-            for i in 0..x.len() {
-                x[i] += alpha * self.p[i];
-                self.r[i] -= alpha * self.q[i];
-            }
+            let (p, q) = (&self.p, &self.q);
+            let (x_rows, r_rows) = ((&mut *x, ROWS), (&mut self.r[..], ROWS));
+            self.workers.chunks_of_two(x_rows, r_rows, |c, x, r| {
+                for (i, (x, r)) in (c * ROWS..).zip(x.iter_mut().zip(r)) {
+                    *x += alpha * p[i];
+                    *r -= alpha * q[i];
+                }
+            });
             self.preconditioner.project(&mut self.r);
-            rr = dot(&self.r, &self.r);
+            rr = self.dot(&self.r, &self.r);
             self.preconditioner.apply(product, &self.r, &mut self.z);
-            let next = dot(&self.r, &self.z);
+            let next = self.dot(&self.r, &self.z);
             let beta = next / rz;
             rz = next;
-            for i in 0..x.len() {
-                self.p[i] = self.z[i] + beta * self.p[i];
-            }
+            let z = &self.z;
+            self.workers.chunks(&mut self.p, ROWS, |c, p| {
+                for (p, z) in p.iter_mut().zip(&z[c * ROWS..]) {
+                    *p = z + beta * *p;
+                }
+            });
         }
         if rr.is_nan() {
             return Err(LinearError::NoConvergence);

@@ -4,14 +4,12 @@
 //! added to the whole in the order of the subtrees.
 
 use super::cholesky::Number;
+use super::tiles::{Right, Rows, SIDE, Shape, Tiles};
 use super::tree::{Tree, columns, panel, place, rows};
 use crate::math::parallel::Workers;
 use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 use pulp::{Arch, Simd, WithSimd};
 use std::ops::Range;
-
-/// Columns that are taken at once.
-const GROUP: usize = 4;
 
 /// Vectors that the solution with a factor needs.
 #[derive(Default)]
@@ -36,13 +34,17 @@ struct Part<T> {
     above: Vec<u32>,
     /// The unknowns and the rows above them that they are coupled with, those of the last supernode.
     x: Vec<T>,
-    /// Part of a vector below a supernode.
-    below: Vec<T>,
+    /// The vector of a supernode.
+    own: Vec<Rows<T>>,
 }
 
 impl<T: Number> Substitution<T> {
     /// For the supernodes of a pattern.
-    pub(super) fn new(symbolic: &SymbolicSupernodalCholesky<u32>, tree: &Tree) -> Self {
+    pub(super) fn new(
+        symbolic: &SymbolicSupernodalCholesky<u32>,
+        tree: &Tree,
+        tiles: &Tiles<T>,
+    ) -> Self {
         let mut places = symbolic.row_idx().to_vec();
         let (mut parts, mut ends): (Vec<Part<T>>, _) = (Vec::new(), Vec::new());
         let mut part_of = vec![usize::MAX; tree.parent.len()];
@@ -54,7 +56,7 @@ impl<T: Number> Substitution<T> {
             let above = panel(symbolic, last).0;
             let mut longest = 0;
             for s in nodes.clone() {
-                longest = longest.max(rows(symbolic, s).len());
+                longest = longest.max(tiles.panel(s).shape.tiles());
                 let mut at = 0;
                 for row in &mut places[rows(symbolic, s)] {
                     *row = place(*row, &inside, above, &mut at);
@@ -70,7 +72,7 @@ impl<T: Number> Substitution<T> {
                 nodes,
                 parent: parts.len(),
                 x: vec![T::of(0.0); inside.len() + above.len()],
-                below: vec![T::of(0.0); longest],
+                own: vec![[T::of(0.0); SIDE]; longest],
                 children,
                 above: Vec::new(),
                 inside,
@@ -108,16 +110,9 @@ impl<T: Number> Substitution<T> {
     }
 
     /// `x = L^-T L^-1 x`.
-    pub(super) fn solve(
-        &mut self,
-        symbolic: &SymbolicSupernodalCholesky<u32>,
-        factor: &[T],
-        x: &mut [T],
-        workers: &Workers,
-    ) {
+    pub(super) fn solve(&mut self, factor: Factor<'_, T>, x: &mut [T], workers: &Workers) {
         let arch = Arch::new();
         let panels = Panels {
-            symbolic,
             places: &self.places,
             factor,
         };
@@ -151,7 +146,9 @@ impl<T: Number> Substitution<T> {
 
     /// Bytes held.
     pub(super) fn bytes(&self) -> usize {
-        let parts: usize = self.parts.iter().map(|p| p.x.len() + p.below.len()).sum();
+        let parts: usize = (self.parts.iter())
+            .map(|p| p.x.len() + SIDE * p.own.len())
+            .sum();
         size_of::<T>() * parts + 4 * self.places.len()
     }
 }
@@ -184,80 +181,87 @@ impl<T: Number> Part<T> {
             nodes: self.nodes.clone(),
             begin: self.inside.start,
             x: &mut self.x,
-            below: &mut self.below,
+            own: &mut self.own,
         }
     }
 }
 
-/// The panels of a factor, with the places of their rows in the vectors.
-struct Panels<'a, T> {
-    symbolic: &'a SymbolicSupernodalCholesky<u32>,
-    places: &'a [u32],
-    factor: &'a [T],
+/// A factor: its supernodes and their tiles.
+pub(super) struct Factor<'a, T: Number> {
+    pub(super) symbolic: &'a SymbolicSupernodalCholesky<u32>,
+    pub(super) tiles: &'a Tiles<T>,
 }
 
-impl<T> Clone for Panels<'_, T> {
+impl<T: Number> Clone for Factor<'_, T> {
     fn clone(&self) -> Self {
         *self
     }
 }
 
-impl<T> Copy for Panels<'_, T> {}
+impl<T: Number> Copy for Factor<'_, T> {}
 
-impl<'a, T> Panels<'a, T> {
-    /// Rows below a supernode, its panel and its unknowns in a vector that begins with unknown `begin`.
-    #[inline(always)]
-    fn get(&self, s: usize, begin: usize) -> (&'a [u32], Panel<'a, T>, Range<usize>) {
-        let inside = columns(self.symbolic, s);
-        let places = &self.places[rows(self.symbolic, s)];
-        let panel = Panel {
-            columns: &self.factor[panel(self.symbolic, s).1],
-            width: inside.len(),
-            height: inside.len() + places.len(),
-        };
-        (places, panel, inside.start - begin..inside.end - begin)
+impl<T: Number> Factor<'_, T> {
+    /// `X = L^-T L^-1 X` for several right-hand sides.
+    pub(super) fn solve_all(self, x: &mut [Right<T>]) {
+        Arch::new().dispatch(All { factor: self, x });
     }
 }
 
+/// The factor with the places of its rows in the vectors of parts.
+struct Panels<'a, T: Number> {
+    factor: Factor<'a, T>,
+    places: &'a [u32],
+}
+
+impl<T: Number> Clone for Panels<'_, T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T: Number> Copy for Panels<'_, T> {}
+
 /// What supernodes work on.
-struct Vectors<'a, T> {
+struct Vectors<'a, T: Number> {
     panels: Panels<'a, T>,
     nodes: Range<usize>,
     /// First unknown of the vector.
     begin: usize,
     x: &'a mut [T],
-    below: &'a mut [T],
+    own: &'a mut [Rows<T>],
 }
 
 /// Elimination of the supernodes in their order.
-struct Forward<'a, T>(Vectors<'a, T>);
+struct Forward<'a, T: Number>(Vectors<'a, T>);
 /// Solution for them against their order.
-struct Backward<'a, T>(Vectors<'a, T>);
+struct Backward<'a, T: Number>(Vectors<'a, T>);
 
 impl<T: Number> WithSimd for Forward<'_, T> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let at = self.0;
-        for s in at.nodes {
-            let (places, panel, inside) = at.panels.get(s, at.begin);
-            let below = &mut at.below[..places.len()];
+        let Vectors {
+            panels: Panels { factor, places },
+            nodes,
+            begin,
+            x,
+            own,
+        } = self.0;
+        for s in nodes {
+            let panel = factor.tiles.panel(s);
+            let shape = panel.shape;
+            let first = columns(factor.symbolic, s).start - begin;
+            let own = &mut own[..shape.tiles()];
+            let (unknowns, below) = parts(own, shape);
+            unknowns[..shape.width].copy_from_slice(&x[first..first + shape.width]);
+            unknowns[shape.width..].fill(T::of(0.0));
             below.fill(T::of(0.0));
-            let inside = &mut at.x[inside];
-            let mut j = 0;
-            while j + GROUP <= panel.width {
-                panel.forward::<GROUP>(j, inside, below);
-                j += GROUP;
-            }
-            match panel.width - j {
-                1 => panel.forward::<1>(j, inside, below),
-                2 => panel.forward::<2>(j, inside, below),
-                3 => panel.forward::<3>(j, inside, below),
-                _ => {}
-            }
-            for (b, place) in below.iter().zip(places) {
-                at.x[*place as usize] -= *b;
+            panel.forward(own);
+            let (unknowns, below) = parts(own, shape);
+            x[first..first + shape.width].copy_from_slice(&unknowns[..shape.width]);
+            for (b, place) in below.iter().zip(&places[rows(factor.symbolic, s)]) {
+                x[*place as usize] += *b;
             }
         }
     }
@@ -267,91 +271,80 @@ impl<T: Number> WithSimd for Backward<'_, T> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) {
-        let at = self.0;
-        for s in at.nodes.rev() {
-            let (places, panel, inside) = at.panels.get(s, at.begin);
-            let below = &mut at.below[..places.len()];
-            for (b, place) in below.iter_mut().zip(places) {
-                *b = at.x[*place as usize];
+    fn with_simd<S: Simd>(self, _: S) {
+        let Vectors {
+            panels: Panels { factor, places },
+            nodes,
+            begin,
+            x,
+            own,
+        } = self.0;
+        for s in nodes.rev() {
+            let panel = factor.tiles.panel(s);
+            let shape = panel.shape;
+            let first = columns(factor.symbolic, s).start - begin;
+            let own = &mut own[..shape.tiles()];
+            let (unknowns, below) = parts(own, shape);
+            unknowns[..shape.width].copy_from_slice(&x[first..first + shape.width]);
+            unknowns[shape.width..].fill(T::of(0.0));
+            below[shape.below..].fill(T::of(0.0));
+            for (b, place) in below.iter_mut().zip(&places[rows(factor.symbolic, s)]) {
+                *b = x[*place as usize];
             }
-            let inside = &mut at.x[inside];
-            let mut j = panel.width - panel.width % GROUP;
-            match panel.width - j {
-                1 => panel.backward::<S, 1>(simd, j, inside, below),
-                2 => panel.backward::<S, 2>(simd, j, inside, below),
-                3 => panel.backward::<S, 3>(simd, j, inside, below),
-                _ => {}
-            }
-            while j > 0 {
-                j -= GROUP;
-                panel.backward::<S, GROUP>(simd, j, inside, below);
-            }
+            panel.backward(own);
+            let (unknowns, _) = parts(own, shape);
+            x[first..first + shape.width].copy_from_slice(&unknowns[..shape.width]);
         }
     }
 }
 
-/// The panel of a supernode: the columns of its unknowns, each with all rows. Plain loops over a few of them at a time beat the general
-/// dense kernels for one right-hand side and narrow panels.
-struct Panel<'a, T> {
-    columns: &'a [T],
-    width: usize,
-    height: usize,
+/// The unknowns of a supernode's vector and the rows below.
+#[inline(always)]
+fn parts<T>(own: &mut [Rows<T>], shape: Shape) -> (&mut [T], &mut [T]) {
+    own.as_flattened_mut().split_at_mut(SIDE * shape.groups())
 }
 
-impl<'a, T: Number> Panel<'a, T> {
-    /// `K` columns from the one of unknown `j` on, each from row `j` on.
-    #[inline(always)]
-    fn group<const K: usize>(&self, j: usize) -> [&'a [T]; K] {
-        std::array::from_fn(|k| &self.columns[(j + k) * self.height + j..(j + k + 1) * self.height])
-    }
+/// Both for all supernodes and several right-hand sides.
+struct All<'a, T: Number> {
+    factor: Factor<'a, T>,
+    x: &'a mut [Right<T>],
+}
 
-    /// Eliminates unknowns `j..j + K`.
-    #[inline(always)]
-    fn forward<const K: usize>(&self, j: usize, inside: &mut [T], below: &mut [T]) {
-        let columns = self.group::<K>(j);
-        // all quotients at once: none waits for another
-        let inverse: [T; K] = std::array::from_fn(|k| T::of(1.0) / columns[k][k]);
-        let (solved, rest) = inside[j..].split_at_mut(K);
-        let mut values = [T::of(0.0); K];
-        for k in 0..K {
-            let mut value = solved[k];
-            for i in 0..k {
-                value -= columns[i][k] * values[i];
-            }
-            values[k] = value * inverse[k];
-        }
-        solved.copy_from_slice(&values);
-        let (inner, outer) = (
-            columns.map(|c| &c[K..][..rest.len()]),
-            columns.map(|c| &c[self.width - j..][..below.len()]),
-        );
-        for (i, x) in rest.iter_mut().enumerate() {
-            for k in 0..K {
-                *x -= inner[k][i] * values[k];
-            }
-        }
-        for (i, x) in below.iter_mut().enumerate() {
-            for k in 0..K {
-                *x += outer[k][i] * values[k];
-            }
-        }
-    }
+impl<T: Number> WithSimd for All<'_, T> {
+    type Output = ();
 
-    /// Solves for unknowns `j..j + K` when all after them are known.
     #[inline(always)]
-    fn backward<S: Simd, const K: usize>(&self, simd: S, j: usize, inside: &mut [T], below: &[T]) {
-        let columns = self.group::<K>(j);
-        let inverse: [T; K] = std::array::from_fn(|k| T::of(1.0) / columns[k][k]);
-        let (solved, rest) = inside[j..].split_at_mut(K);
-        let inner = T::dots(simd, columns.map(|c| &c[K..][..rest.len()]), rest);
-        let outer = T::dots(simd, columns.map(|c| &c[self.width - j..]), below);
-        for k in (0..K).rev() {
-            let mut value = solved[k] - inner[k] - outer[k];
-            for i in k + 1..K {
-                value -= columns[k][i] * solved[i];
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { factor, x } = self;
+        let symbolic = factor.symbolic;
+        let zero = [T::of(0.0); SIDE];
+        let mut own = Vec::new();
+        for s in 0..symbolic.n_supernodes() {
+            let tiles = factor.tiles.panel(s);
+            let shape = tiles.shape;
+            let (inside, below) = (columns(symbolic, s), panel(symbolic, s).0);
+            own.clear();
+            own.extend_from_slice(&x[inside.clone()]);
+            own.resize(SIDE * shape.tiles(), zero);
+            tiles.forward_all(&mut own);
+            x[inside].copy_from_slice(&own[..shape.width]);
+            for (row, taken) in below.iter().zip(&own[SIDE * shape.groups()..]) {
+                for (x, taken) in x[*row as usize].iter_mut().zip(taken) {
+                    *x += *taken;
+                }
             }
-            solved[k] = value * inverse[k];
+        }
+        for s in (0..symbolic.n_supernodes()).rev() {
+            let tiles = factor.tiles.panel(s);
+            let shape = tiles.shape;
+            let (inside, below) = (columns(symbolic, s), panel(symbolic, s).0);
+            own.clear();
+            own.extend_from_slice(&x[inside.clone()]);
+            own.resize(SIDE * shape.groups(), zero);
+            own.extend(below.iter().map(|row| x[*row as usize]));
+            own.resize(SIDE * shape.tiles(), zero);
+            tiles.backward_all(&mut own);
+            x[inside].copy_from_slice(&own[..shape.width]);
         }
     }
 }
