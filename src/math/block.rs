@@ -119,6 +119,15 @@ impl BlockMatrix {
         Self { pattern, blocks }
     }
 
+    /// Takes another pattern; what the blocks hold then has no meaning.
+    pub fn take_pattern(&mut self, pattern: BlockPattern) {
+        let count = pattern.rows.len();
+        self.blocks
+            .reserve_exact(count.saturating_sub(self.blocks.len()));
+        self.blocks.resize(count, Mat3::zeros());
+        self.pattern = pattern;
+    }
+
     /// Number of block rows.
     pub fn n(&self) -> usize {
         self.pattern.n()

@@ -141,7 +141,7 @@ impl Assembler {
             pattern.widths = widths.to_vec();
         }
         if pattern != self.matrix.pattern {
-            self.matrix = BlockMatrix::zeros(pattern);
+            self.matrix.take_pattern(pattern);
         }
         let mut spreads = Spreads {
             starts: vec![0],

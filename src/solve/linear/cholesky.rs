@@ -126,18 +126,16 @@ impl<T: Number> Cholesky<T> {
         slot: &'a mut Option<Self>,
         pattern: &BlockPattern,
     ) -> Result<&'a mut Self, LinearError> {
-        // the old memory goes before the new is taken
-        if slot.as_ref().is_some_and(|c| c.pattern != *pattern) {
-            *slot = None;
-        }
-        if slot.is_none() {
-            *slot = Some(Self::new(pattern)?);
+        if slot.as_ref().is_none_or(|c| c.pattern != *pattern) {
+            // the old memory goes before the new is taken
+            let tiles = slot.take().map(|old| old.tiles);
+            *slot = Some(Self::new(pattern, tiles.unwrap_or_default())?);
         }
         slot.as_mut().ok_or(LinearError::NoConvergence)
     }
 
-    /// Analysis of a pattern.
-    fn new(pattern: &BlockPattern) -> Result<Self, LinearError> {
+    /// Analysis of a pattern, in the memory of older tiles.
+    fn new(pattern: &BlockPattern, old: Tiles<T>) -> Result<Self, LinearError> {
         let n = pattern.n();
         // faer counts with the same 32 bits and refuses a factor that has more numbers
         if 9 * pattern.rows.len() > u32::MAX as usize {
@@ -221,7 +219,7 @@ impl<T: Number> Cholesky<T> {
                 width: columns(nodes, s).len(),
                 below: panel(nodes, s).0.len(),
             });
-            tiles = Tiles::new(shapes.collect())?;
+            tiles = old.reshaped(shapes.collect())?;
             substitution = Substitution::new(nodes, &tree, &tiles);
         }
         Ok(Self {

@@ -21,6 +21,7 @@ use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 use faer::{Accum, MatMut, MatRef, Par};
 use pulp::{Arch, Simd, WithSimd};
 use std::ops::Range;
+use std::sync::Mutex;
 
 /// Columns that are eliminated by plain loops before those after them are updated.
 const NARROW: usize = 32;
@@ -64,26 +65,35 @@ pub(super) struct Fronts<T> {
     /// Place in the parent's front of every row below a supernode.
     relative: Vec<u32>,
     /// One of each subtree.
-    stacks: Vec<Stack<T>>,
+    subtrees: Vec<Subtree<T>>,
+    /// What tasks that have ended worked with.
+    spare: Mutex<Vec<Memory<T>>>,
 }
 
-/// What the supernodes of a subtree leave to those above, one after the other.
-struct Stack<T> {
-    left: Vec<T>,
-    /// Numbers that it takes at most, and those of them that are for what is above.
+/// What is known of a subtree.
+struct Subtree<T> {
+    /// Numbers that its stack takes at most, and those of them that are for what is above.
     most: usize,
     root: usize,
+    /// The latter.
+    left: Vec<T>,
+    done: Result<(), LinearError>,
+}
+
+/// What a task works with.
+struct Memory<T> {
+    /// What the supernodes of a subtree leave to those above, one after the other.
+    stack: Vec<T>,
     /// The panel of a front.
     panel: Vec<T>,
-    /// Diagonal of a front before anything is taken from it.
+    /// Its diagonal before anything is taken from it.
     diagonal: Vec<T>,
-    done: Result<(), LinearError>,
 }
 
 /// A subtree at work.
 struct Task<'a, T: Number> {
     nodes: Range<usize>,
-    stack: &'a mut Stack<T>,
+    subtree: &'a mut Subtree<T>,
     kept: Rest<'a, T>,
 }
 
@@ -114,7 +124,7 @@ impl<T: Number> Fronts<T> {
             }
         }
         let left = |s: usize| panel(symbolic, s).0.len().pow(2);
-        let stack = |nodes: &Range<usize>| {
+        let subtree = |nodes: &Range<usize>| {
             let (mut now, mut most) = (0_usize, 0);
             for s in nodes.clone() {
                 most = most.max(now + left(s));
@@ -123,18 +133,17 @@ impl<T: Number> Fronts<T> {
                     now -= left(child);
                 }
             }
-            Stack {
-                left: Vec::new(),
+            Subtree {
                 most,
                 root: nodes.clone().last().map_or(0, left),
-                panel: Vec::new(),
-                diagonal: Vec::new(),
+                left: Vec::new(),
                 done: Ok(()),
             }
         };
         Self {
             relative,
-            stacks: tree.subtrees.iter().map(stack).collect(),
+            subtrees: tree.subtrees.iter().map(subtree).collect(),
+            spare: Mutex::default(),
         }
     }
 
@@ -148,42 +157,48 @@ impl<T: Number> Fronts<T> {
         let tree = source.tree;
         let relative = &self.relative;
         if tree.levels.is_empty()
-            && let ([nodes], [stack]) = (&tree.subtrees[..], &mut self.stacks[..])
+            && let ([nodes], [subtree]) = (&tree.subtrees[..], &mut self.subtrees[..])
         {
             let mut whole = Task {
                 nodes: nodes.clone(),
-                stack,
+                subtree,
                 kept: tiles.rest(),
             };
-            return whole.factorize(source, relative);
+            let mut memory = take(&self.spare);
+            whole.factorize(source, relative, &mut memory)?;
+            give(&self.spare, memory);
+            return Ok(());
         }
         let (mut rest, mut at) = (tiles.rest(), 0);
-        let mut tasks = Vec::with_capacity(self.stacks.len());
-        for (nodes, stack) in tree.subtrees.iter().zip(&mut self.stacks) {
+        let mut tasks = Vec::with_capacity(self.subtrees.len());
+        for (nodes, subtree) in tree.subtrees.iter().zip(&mut self.subtrees) {
             rest.take(nodes.start - at);
             at = nodes.end;
             tasks.push(Task {
                 nodes: nodes.clone(),
-                stack,
+                subtree,
                 kept: rest.take(nodes.len()),
             });
         }
+        let spare = &self.spare;
         workers.chunks(&mut tasks, 1, |_, tasks| {
             for task in tasks {
-                task.stack.done = task.factorize(source, relative);
-                // of all subtrees at once there is only what they leave
-                task.stack.left.shrink_to_fit();
-                task.stack.panel = Vec::new();
+                let mut memory = take(spare);
+                task.subtree.done = task.factorize(source, relative, &mut memory);
+                // after a refusal what was left before is still there
+                task.subtree.left.clear();
+                task.subtree.left.extend_from_slice(&memory.stack);
+                give(spare, memory);
             }
         });
-        for stack in &self.stacks {
-            stack.done?;
+        for subtree in &self.subtrees {
+            subtree.done?;
         }
         let mut left: Vec<Vec<T>> = Vec::new();
         left.resize_with(tree.parent.len(), Vec::new);
-        for (nodes, stack) in tree.subtrees.iter().zip(&mut self.stacks) {
+        for (nodes, subtree) in tree.subtrees.iter().zip(&mut self.subtrees) {
             if let Some(root) = nodes.clone().last() {
-                left[root] = std::mem::take(&mut stack.left);
+                left[root] = std::mem::take(&mut subtree.left);
             }
         }
         for level in &tree.levels {
@@ -218,9 +233,26 @@ impl<T: Number> Fronts<T> {
 
     /// Bytes held while it factors on one thread.
     pub(super) fn bytes(&self) -> usize {
-        let left: usize = self.stacks.iter().map(|stack| stack.root).sum();
-        let most = self.stacks.iter().map(|stack| stack.most).max();
+        let left: usize = self.subtrees.iter().map(|subtree| subtree.root).sum();
+        let most = self.subtrees.iter().map(|subtree| subtree.most).max();
         4 * self.relative.len() + size_of::<T>() * (left + most.unwrap_or(0))
+    }
+}
+
+/// Memory to work with, of an earlier task if there is any.
+fn take<T>(spare: &Mutex<Vec<Memory<T>>>) -> Memory<T> {
+    let known = spare.lock().ok().and_then(|mut spare| spare.pop());
+    known.unwrap_or(Memory {
+        stack: Vec::new(),
+        panel: Vec::new(),
+        diagonal: Vec::new(),
+    })
+}
+
+/// Leaves memory to later tasks.
+fn give<T>(spare: &Mutex<Vec<Memory<T>>>, memory: Memory<T>) {
+    if let Ok(mut spare) = spare.lock() {
+        spare.push(memory);
     }
 }
 
@@ -262,18 +294,17 @@ impl<T: Number> Task<'_, T> {
         &mut self,
         source: &Source<'_, B>,
         relative: &[u32],
+        memory: &mut Memory<T>,
     ) -> Result<(), LinearError> {
         let Source { symbolic, tree, .. } = source;
         let alone = Workers::default();
-        let Stack {
-            left,
-            most,
+        let Memory {
+            stack: left,
             panel: own,
             diagonal,
-            ..
-        } = &mut *self.stack;
+        } = memory;
         left.clear();
-        left.try_reserve_exact(*most)
+        left.try_reserve_exact(self.subtree.most)
             .map_err(|_| LinearError::NoConvergence)?;
         for s in self.nodes.clone() {
             let (width, below) = (columns(symbolic, s).len(), panel(symbolic, s).0.len());

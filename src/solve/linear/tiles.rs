@@ -43,17 +43,24 @@ impl<T: Number> Default for Tiles<T> {
 }
 
 impl<T: Number> Tiles<T> {
-    /// Memory for the panels of these shapes.
-    pub(super) fn new(shapes: Vec<Shape>) -> Result<Self, LinearError> {
+    /// For the panels of these shapes, in the memory of `self`; what they hold has no meaning.
+    pub(super) fn reshaped(self, shapes: Vec<Shape>) -> Result<Self, LinearError> {
         let (mut begins, mut end) = (vec![[0; 2]], [0; 2]);
         for shape in &shapes {
             end = [end[0] + shape.len(), end[1] + shape.groups()];
             begins.push(end);
         }
-        let (mut columns, mut inverses) = (Vec::new(), Vec::new());
+        let Self {
+            mut columns,
+            mut inverses,
+            ..
+        } = self;
+        columns.truncate(end[0]);
+        inverses.truncate(end[1]);
         let refused = |_| LinearError::NoConvergence;
-        columns.try_reserve_exact(end[0]).map_err(refused)?;
-        inverses.try_reserve_exact(end[1]).map_err(refused)?;
+        let more = [end[0] - columns.len(), end[1] - inverses.len()];
+        columns.try_reserve_exact(more[0]).map_err(refused)?;
+        inverses.try_reserve_exact(more[1]).map_err(refused)?;
         columns.resize(end[0], [T::Stored::default(); SIDE]);
         inverses.resize(end[1], [[T::of(0.0); SIDE]; SIDE]);
         Ok(Self {
@@ -327,7 +334,8 @@ fn eliminate<T: Number, const K: usize>((first, tiles): Group<'_, T, K>, x: &mut
 fn substitute<T: Number, const K: usize>((first, tiles): Group<'_, T, K>, x: &mut [Rows<T>]) {
     if let [own, rest @ ..] = x {
         let mut sums = [[T::of(0.0); SIDE]; K];
-        for (tile, x) in tiles.iter().zip(rest) {
+        // the memory of all tiles is read in one direction
+        for (tile, x) in tiles.iter().zip(&rest[..tiles.len()]).rev() {
             for k in 0..K {
                 sums[k] = plus(sums[k], &tile[k], x);
             }
@@ -448,7 +456,7 @@ mod tests {
             let shape = Shape { width, below };
             let height = width + below;
             let (panel, start) = panel(shape);
-            let mut tiles = Tiles::<f64>::new(vec![shape]).unwrap();
+            let mut tiles = Tiles::<f64>::default().reshaped(vec![shape]).unwrap();
             tiles.rest().keep(&panel);
             let kept = tiles.panel(0);
             let at = |i: usize| match i.checked_sub(width) {
