@@ -430,6 +430,33 @@ fn subtrees_side_by_side_give_the_same_bits_and_the_solution() {
     }
 }
 
+/// A matrix that is not positive definite is refused and changes nothing for the ones after it, nor does one of another pattern.
+#[test]
+fn a_refused_matrix_leaves_no_trace() {
+    let case = sewn_cloth(6_000, 3, 0.1);
+    let n = case.matrix.n();
+    let b = forces(n, 3);
+    let mut bad = case.matrix.clone();
+    let last = bad.pattern.starts[n - 1] as usize;
+    let most = bad.blocks[last].norm();
+    bad.blocks[last] -= Mat3::identity() * (2.0 * most);
+    let other = sewn_cloth(1_600, 3, 0.1);
+    let solve = |before: &[&BlockMatrix]| {
+        let mut direct = Direct::new(&Workers::new(2));
+        for matrix in before {
+            let refused = std::ptr::eq(*matrix, &raw const bad);
+            assert_eq!(direct.prepare(matrix).is_err(), refused);
+        }
+        direct.prepare(&case.matrix).expect("prepares");
+        let mut x = vec![Vec3::zeros(); n];
+        direct.solve(&case.matrix, &b, &mut x, 0.0).expect("solves");
+        x
+    };
+    let alone = solve(&[]);
+    assert_eq!(alone, solve(&[&bad]));
+    assert_eq!(alone, solve(&[&other.matrix, &bad, &other.matrix]));
+}
+
 /// Parts have one order: what they add up to is the same for any number of threads, and of use.
 #[test]
 fn overlapping_parts_give_the_same_bits_and_few_iterations() {
