@@ -2,8 +2,8 @@
 //!
 //! The fill-reducing permutation is approximate minimum degree (Amestoy, Davis and Duff 1996) on
 //! the graph of 3x3 blocks, brought into postorder and expanded to the scalars that are unknowns: the same fill as on scalars, several times
-//! cheaper, and the scalars of a vertex stay together in a supernode. The supernodes are faer's; [`fronts`](super::fronts) factors and
-//! [`substitution`](super::substitution) solves.
+//! cheaper, and the scalars of a vertex stay together in a supernode. The supernodes are faer's; [`fronts`](super::fronts) factors into
+//! [`tiles`](super::tiles), with which [`substitution`](super::substitution) solves.
 //!
 //! Permutation, symbolic factor and work memory are a function of the pattern alone and are kept
 //! while it stays the same; then a new factor of a small matrix allocates nothing.
@@ -336,15 +336,26 @@ impl<T: Number> Cholesky<T> {
 }
 
 impl Cholesky<f64> {
-    /// Solves with the factor for sparse right-hand sides of `(scalar row, value)`, in columns; on this thread.
-    pub(super) fn solve_columns(&self, right: &[Vec<(u32, f64)>]) -> Result<Mat<f64>, LinearError> {
-        let mut out = Mat::zeros(3 * self.place.len(), right.len());
+    /// The factor, for [`Self::solve_columns`]; none of an empty matrix.
+    pub(super) fn factor(&self) -> Result<Option<Factor<'_, f64>>, LinearError> {
         if self.place.is_empty() {
-            return Ok(out);
+            return Ok(None);
         }
-        let factor = Factor {
+        Ok(Some(Factor {
             symbolic: supernodal(&self.symbolic)?,
             tiles: &self.tiles,
+        }))
+    }
+
+    /// Solves with the factor for sparse right-hand sides of `(scalar row, value)`, in columns; on this thread.
+    pub(super) fn solve_columns(
+        &self,
+        factor: Option<Factor<'_, f64>>,
+        right: &[Vec<(u32, f64)>],
+    ) -> Mat<f64> {
+        let mut out = Mat::zeros(3 * self.place.len(), right.len());
+        let Some(factor) = factor else {
+            return out;
         };
         let place = |i: usize| scalars(&self.offsets, self.place[i / 3]).nth(i % 3);
         let mut permuted: Vec<Right<f64>> = vec![[0.0; SIDE]; self.rhs.len()];
@@ -367,7 +378,7 @@ impl Cholesky<f64> {
                 }
             }
         }
-        Ok(out)
+        out
     }
 }
 

@@ -220,17 +220,14 @@ impl Constrained {
         let Some(cholesky) = &self.cholesky else {
             return Err(LinearError::NoConvergence);
         };
+        let factor = cholesky.factor()?;
         let columns = &self.work.columns;
         let mut schur = vec![0.0; width * width];
         self.workers
             .chunks(&mut schur, BATCH * width.max(1), |batch, chunk| {
                 let from = batch * BATCH;
                 let count = chunk.len() / width;
-                let Ok(solved) = cholesky.solve_columns(&columns[from..from + count]) else {
-                    // refused below: an entry is not finite
-                    chunk.fill(f64::NAN);
-                    return;
-                };
+                let solved = cholesky.solve_columns(factor, &columns[from..from + count]);
                 for (k, out) in chunk.chunks_mut(width).enumerate() {
                     for (row, entry) in out.iter_mut().enumerate() {
                         let by: f64 = (columns[row].iter())

@@ -253,9 +253,7 @@ impl<T: Number> WithSimd for Forward<'_, T> {
             let shape = panel.shape;
             let first = columns(factor.symbolic, s).start - begin;
             let own = &mut own[..shape.tiles()];
-            let (unknowns, below) = parts(own, shape);
-            unknowns[..shape.width].copy_from_slice(&x[first..first + shape.width]);
-            unknowns[shape.width..].fill(T::of(0.0));
+            let below = load(own, shape, &x[first..first + shape.width]);
             below.fill(T::of(0.0));
             panel.forward(own);
             let (unknowns, below) = parts(own, shape);
@@ -284,9 +282,7 @@ impl<T: Number> WithSimd for Backward<'_, T> {
             let shape = panel.shape;
             let first = columns(factor.symbolic, s).start - begin;
             let own = &mut own[..shape.tiles()];
-            let (unknowns, below) = parts(own, shape);
-            unknowns[..shape.width].copy_from_slice(&x[first..first + shape.width]);
-            unknowns[shape.width..].fill(T::of(0.0));
+            let below = load(own, shape, &x[first..first + shape.width]);
             below[shape.below..].fill(T::of(0.0));
             for (b, place) in below.iter_mut().zip(&places[rows(factor.symbolic, s)]) {
                 *b = x[*place as usize];
@@ -296,6 +292,16 @@ impl<T: Number> WithSimd for Backward<'_, T> {
             x[first..first + shape.width].copy_from_slice(&unknowns[..shape.width]);
         }
     }
+}
+
+/// Writes the unknowns of a supernode's vector and tells the rows below.
+#[inline(always)]
+fn load<'a, T: Number>(own: &'a mut [Rows<T>], shape: Shape, x: &[T]) -> &'a mut [T] {
+    let (unknowns, below) = parts(own, shape);
+    let (own, rest) = unknowns.split_at_mut(shape.width);
+    own.copy_from_slice(x);
+    rest.fill(T::of(0.0));
+    below
 }
 
 /// The unknowns of a supernode's vector and the rows below.

@@ -106,7 +106,6 @@ impl<T: Number> Tiles<T> {
 }
 
 /// Panels of supernodes in their order, to be written.
-#[derive(Default)]
 pub(super) struct Rest<'a, T: Number> {
     shapes: &'a [Shape],
     columns: &'a mut [Column<T>],

@@ -129,7 +129,7 @@ pub(super) fn columns(symbolic: &SymbolicSupernodalCholesky<u32>, s: usize) -> R
     symbolic.supernode_begin()[s] as usize..symbolic.supernode_end()[s] as usize
 }
 
-/// Rows below a supernode's diagonal block, and where its panel is stored.
+/// Rows below a supernode's diagonal block, and the numbers of its panel among those of all.
 pub(super) fn panel(
     symbolic: &SymbolicSupernodalCholesky<u32>,
     s: usize,
