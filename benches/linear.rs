@@ -14,6 +14,7 @@ use std::time::Instant;
 use toile::math::Vec3;
 use toile::math::parallel::Workers;
 use toile::solve::linear::LinearSolver;
+use toile::solve::linear::choose::DROPPED;
 use toile::solve::linear::direct::Direct;
 use toile::solve::linear::factored::SingleFactor;
 use toile::solve::linear::ic0::{IncompleteCholesky, Order, Storage};
@@ -52,6 +53,7 @@ fn main() {
                 (
                     "cg cholesky",
                     Box::new(ConjugateGradients::new(Box::new(SingleFactor::new(
+                        DROPPED,
                         &Workers::default(),
                     )))),
                 ),

@@ -44,6 +44,15 @@ impl Coupling {
         self.riders.carry(values);
     }
 
+    /// Visits the points that do not move by themselves: those that ride, those of rings, and the vertices that carry either.
+    pub fn joined(&self, mut visit: impl FnMut(u32)) {
+        let blended = self.filter.as_deref().map_or(&[][..], Filter::nodes);
+        for rider in self.riders.list().iter().chain(blended) {
+            visit(rider.point);
+            rider.vertices.into_iter().for_each(&mut visit);
+        }
+    }
+
     /// Turns a gradient by points that move independently into one by vertices, with what hangs on them, and by what
     /// nodes do beside that.
     pub fn gather(&self, gradient: &mut [Vec3]) {

@@ -42,7 +42,7 @@ const CHUNK: usize = 2_048;
 /// Place of a block that is in no group.
 const NOWHERE: u32 = u32::MAX;
 
-/// Which stencils every block is in.
+/// Which stencils every block is in, and which blocks groups may have.
 #[derive(Debug, Default)]
 pub(super) struct Local {
     starts: Vec<u32>,
@@ -50,6 +50,8 @@ pub(super) struct Local {
     stencils: Vec<(u16, u32)>,
     /// What every block could still lose by itself [J].
     energies: Vec<f64>,
+    /// Whether a block is in no group: it is fixed, or a part of the coupling of yarns and triangles, of which groups do not know.
+    held: Vec<bool>,
 }
 
 /// Blocks that are solved for together, in the order of their unknowns, and the stencils that they are in.
@@ -70,9 +72,10 @@ struct Task {
 }
 
 impl Local {
-    /// Forgets which stencils there are.
+    /// Forgets stencils and coupling.
     pub(super) fn forget(&mut self) {
         self.starts.clear();
+        self.held.clear();
     }
 
     /// Bytes held.
@@ -80,6 +83,7 @@ impl Local {
         size_of_val(&self.starts[..])
             + size_of_val(&self.stencils[..])
             + size_of_val(&self.energies[..])
+            + size_of_val(&self.held[..])
     }
 
     fn know(&mut self, terms: &[Box<dyn Term>], n: usize) {
@@ -121,10 +125,14 @@ impl Local {
         gradient: &[Vec3],
         x: &mut [Vec3],
     ) -> f64 {
+        let n = x.len();
+        if self.held.is_empty() {
+            self.held.extend_from_slice(problem.fixed);
+            (problem.coupling).joined(|point| self.held[point as usize] = true);
+        }
         let Some(worst) = self.worst(problem.workers, matrix, gradient) else {
             return 0.0;
         };
-        let n = x.len();
         if self.starts.len() != n + 1 {
             self.know(problem.terms, n);
         }
@@ -178,13 +186,15 @@ impl Local {
         gradient: &[Vec3],
     ) -> Option<Vec<u32>> {
         self.energies.resize(gradient.len(), 0.0);
+        let held = &self.held;
         workers.chunks(&mut self.energies, CHUNK, |c, energies| {
             for (i, energy) in (c * CHUNK..).zip(energies) {
                 let (diagonal, g) = (
                     matrix.blocks[matrix.pattern.starts[i] as usize],
                     gradient[i],
                 );
-                let factor = (g != Vec3::zeros()).then(|| diagonal.cholesky()).flatten();
+                let free = !held[i] && g != Vec3::zeros();
+                let factor = free.then(|| diagonal.cholesky()).flatten();
                 *energy = factor.map_or(0.0, |factor| 0.5 * g.dot(&factor.solve(&g)));
             }
         });
@@ -227,7 +237,7 @@ impl Local {
             let to = blocks.len();
             for k in from..to {
                 for v in self.of(blocks[k]).iter().flat_map(members) {
-                    if place[*v as usize] == NOWHERE && !problem.fixed[*v as usize] {
+                    if place[*v as usize] == NOWHERE && !self.held[*v as usize] {
                         place[*v as usize] = 0;
                         blocks.push(*v);
                     }

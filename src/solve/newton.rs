@@ -388,9 +388,6 @@ impl Problem<'_> {
             return Err(not_finite(&self.unbounded(x)));
         }
         work.local.forget();
-        // groups do not know of riders and filters
-        let joined = self.coupling.filter.is_some() || !self.coupling.riders.list().is_empty();
-        let settles = tolerance.settle && !joined;
         let mut exactness = tolerance.exactness;
         let mut doubts = 0;
         let first = tolerance.first.unwrap_or(value);
@@ -470,7 +467,7 @@ impl Problem<'_> {
             let noise = 1e-13 * value.abs().max(1e-12);
             let mut length = 1.0;
             let (mut gain, mut moved) = (0.0, f64::INFINITY);
-            let mut mended = !settles;
+            let mut mended = !tolerance.settle;
             loop {
                 for i in 0..n {
                     work.trial[i] = x[i] + work.direction[i] * length;
@@ -544,7 +541,7 @@ impl Problem<'_> {
                 }
                 doubts += 1;
             }
-            if settles && iteration + 1 < tolerance.iterations {
+            if tolerance.settle && iteration + 1 < tolerance.iterations {
                 self.slope(x, assembler, &mut work.negative);
                 let matrix = assembler.matrix();
                 value -= work.local.settle(self, matrix, &work.negative, x);

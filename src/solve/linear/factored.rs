@@ -14,7 +14,6 @@ use crate::math::block::BlockMatrix;
 use crate::math::parallel::Workers;
 
 /// Cholesky factor in f32.
-#[derive(Default)]
 pub struct SingleFactor {
     stiff: StiffPart,
     cholesky: Option<Cholesky<f32>>,
@@ -22,11 +21,12 @@ pub struct SingleFactor {
 }
 
 impl SingleFactor {
-    /// A preconditioner that has seen no matrix yet.
-    pub fn new(workers: &Workers) -> Self {
+    /// A preconditioner that has seen no matrix yet; couplings below `dropped` of the diagonal blocks are not in the factor.
+    pub fn new(dropped: f64, workers: &Workers) -> Self {
         Self {
+            stiff: StiffPart::without(dropped),
+            cholesky: None,
             workers: workers.clone(),
-            ..Self::default()
         }
     }
 }

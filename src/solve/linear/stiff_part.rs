@@ -1,6 +1,6 @@
 //! The stiff part of a matrix, which is what a preconditioner is made from.
 //!
-//! Blocks whose norm is below [`DROPPED`] of the geometric mean of their diagonal blocks (bending
+//! Blocks whose norm is below a given part of the geometric mean of their diagonal blocks (bending of triangles
 //! couples second neighbours a thousand times more weakly than the membrane couples first ones) are
 //! left out and their norm is added to both diagonals, which keeps the matrix positive definite:
 //! `|2 x . B y| <= |B| (|x|^2 + |y|^2)`. A factor then has the fill of the membrane alone. Which
@@ -9,12 +9,11 @@
 use crate::math::Mat3;
 use crate::math::block::{BlockMatrix, BlockPattern};
 
-/// Part of the diagonal blocks below which a coupling is left out.
-const DROPPED: f64 = 3e-3;
-
 /// Which blocks of a matrix are kept, and what is added to its diagonals for the others.
 #[derive(Default)]
 pub(super) struct StiffPart {
+    /// Part of the diagonal blocks below which a coupling is left out.
+    dropped: f64,
     /// Pattern of the whole matrix.
     whole: BlockPattern,
     /// Pattern of the part.
@@ -45,9 +44,17 @@ impl StiffPart {
         }
     }
 
+    /// A part without couplings below `dropped` of the diagonal blocks.
+    pub(super) fn without(dropped: f64) -> Self {
+        Self {
+            dropped,
+            ..Self::default()
+        }
+    }
+
     /// Forgets which blocks were kept.
     pub(super) fn forget(&mut self) {
-        *self = Self::default();
+        *self = Self::without(self.dropped);
     }
 
     /// Pattern of the part.
@@ -81,7 +88,7 @@ impl StiffPart {
         for j in 0..n {
             for k in pattern.starts[j]..pattern.starts[j + 1] {
                 let i = pattern.rows[k as usize] as usize;
-                let limit = DROPPED * (diagonal[i] * diagonal[j]).sqrt();
+                let limit = self.dropped * (diagonal[i] * diagonal[j]).sqrt();
                 if i == j || matrix.blocks[k as usize].norm() >= limit {
                     self.kept.push(k);
                     rows.push(i as u32);
