@@ -303,4 +303,13 @@ fn blend_regions_are_checked() {
         |g| g.blend_regions.push(region(0, 2)),
         &["blend region 0", "2 corners"],
     );
+    refused(
+        |g| {
+            g.blend_regions.push(BlendRegion {
+                rings: 4,
+                ..region(0, 3)
+            });
+        },
+        &["blend region 0", "4 hybrid rings, at most 3"],
+    );
 }

@@ -330,6 +330,10 @@ fn yarns_that_cannot_be_laid_are_refused_with_the_reason() {
             "column 3: warp 3 lies in front of all weft yarns",
         ),
         (r#""weave": "plain", "radius": 1e-4"#, "warp_pitch"),
+        (
+            r#""preset": "jersey", "knit": ["kk"]"#,
+            "yarns.knit: must be text",
+        ),
         (r#""radius": 1e-4"#, "preset"),
         (
             r#""weave": "plain", "warp_pitch": 1, "radius": 0.1, "twist": 1"#,
@@ -342,6 +346,8 @@ fn yarns_that_cannot_be_laid_are_refused_with_the_reason() {
             error.contains("yarns") && error.contains(reason),
             "{yarns}: {error}"
         );
+        // one place is named once
+        assert!(error.matches("yarns.").count() <= 1, "{yarns}: {error}");
     }
 }
 

@@ -16,9 +16,6 @@ use crate::tri::GarmentMesh;
 /// Tolerance over the size of the panel.
 const TOLERANCE: f64 = 1e-6;
 
-/// Most rings.
-const MOST_RINGS: u32 = 3;
-
 /// Which triangles are which.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Region {
@@ -63,10 +60,6 @@ impl Region {
                 ))
                 .at(place(k)));
             }
-            check_rings(region.rings).map_err(|e| {
-                e.at(format!("region of panel '{}'", panel.name))
-                    .at(place(k))
-            })?;
             if region.rings != rings {
                 return Err(Error::unsupported(format!(
                     "{} hybrid rings around the region of panel '{}', {rings} around the first one: all \
@@ -127,16 +120,6 @@ impl Region {
         let sum: f64 = corners.map(|(v, w)| self.alpha[*v as usize] * w).sum();
         sum.clamp(0.0, 1.0)
     }
-}
-
-/// Refuses more hybrid rings than there can be.
-pub fn check_rings(rings: u32) -> Result<()> {
-    if rings <= MOST_RINGS {
-        return Ok(());
-    }
-    Err(Error::argument(format!(
-        "{rings} hybrid rings, at most {MOST_RINGS} can be"
-    )))
 }
 
 fn place(region: usize) -> String {

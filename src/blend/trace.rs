@@ -5,10 +5,9 @@
 //! back. By the parity of crossings the way counts nothing. [`super::Region::new`] then finds the triangles
 //! again: a vertex lies in a polygon if it is one of its piece.
 
-use super::region::check_rings;
 use crate::error::{Error, Result};
 use crate::math::topology;
-use crate::pattern::{BlendRegion, Shape};
+use crate::pattern::{BlendRegion, Shape, check_rings};
 use crate::tri::GarmentMesh;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 

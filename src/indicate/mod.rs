@@ -11,7 +11,7 @@ pub mod indicator;
 
 use crate::blend::{Region, trace};
 use crate::error::{Error, Result};
-use crate::pattern::{BlendRegion, Garment};
+use crate::pattern::{BlendRegion, Garment, check_rings};
 use crate::tri::GarmentMesh;
 use crate::yarn::Cell;
 use cost::{Cost, Predictor};
@@ -82,7 +82,7 @@ impl Wish {
         if self.budget == Some(0) {
             return Err(Error::argument("a budget of 0 yarn nodes allows no yarns"));
         }
-        crate::blend::region::check_rings(self.rings)?;
+        check_rings(self.rings)?;
         Ok(tolerance)
     }
 }

@@ -2,11 +2,14 @@
 
 use super::Panel;
 use super::outline::{Piece, inside, point_distance, polylines};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::math::Vec2;
 
 /// Turn of an edge between two points that distances are measured from [rad].
 const TURN: f64 = 0.1;
+
+/// Most hybrid rings.
+const MOST_RINGS: u32 = 3;
 
 /// A part of a panel in which every yarn is simulated.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,7 +25,7 @@ pub struct BlendRegion {
 /// What of a panel is in a region; flat coordinates [m].
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
-    /// The inside of a polygon.
+    /// The inside of a polygon: what a ray from there leaves through an odd number of sides.
     Polygon(Vec<Vec2>),
     /// What is no farther than `radius` from `center`.
     Disc {
@@ -38,6 +41,16 @@ pub enum Shape {
         /// How far from it.
         width: f64,
     },
+}
+
+/// Refuses more hybrid rings than there can be.
+pub fn check_rings(rings: u32) -> Result<()> {
+    if rings <= MOST_RINGS {
+        return Ok(());
+    }
+    Err(Error::argument(format!(
+        "{rings} hybrid rings, at most {MOST_RINGS} can be"
+    )))
 }
 
 impl BlendRegion {

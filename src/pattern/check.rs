@@ -5,7 +5,7 @@
 
 use super::curve::Curve;
 use super::outline::{Piece, first_contact, inside, polylines};
-use super::{BlendRegion, Garment, Panel, Seam, Shape};
+use super::{BlendRegion, Garment, Panel, Seam, Shape, check_rings};
 use crate::error::{Error, Result};
 use crate::math::Vec2;
 use std::collections::BTreeMap;
@@ -203,6 +203,7 @@ impl Garment {
             )));
         }
         let place = |e: Error| e.at(format!("blend region {k}"));
+        check_rings(region.rings).map_err(place)?;
         match &region.shape {
             Shape::Polygon(corners) => {
                 if corners.len() < 3 {

@@ -17,7 +17,7 @@ pub mod outline;
 pub mod ridge;
 pub mod yarn_fabric;
 
-pub use blend_region::{BlendRegion, Shape};
+pub use blend_region::{BlendRegion, Shape, check_rings};
 pub use fabric::{BendingModel, Fabric};
 pub use ridge::Ridge;
 pub use yarn_fabric::YarnFabric;

@@ -275,7 +275,7 @@ fn read_knit(object: &Object<'_>, preset: Option<&Structure>) -> Result<Structur
         (Some((a, _)), Some((b, _))) => {
             return Err(object.error(format!("has both '{a}' and '{b}'; give one")));
         }
-        (Some((key, node)), None) => read_chart(key, &node).map_err(|e| e.at(&node.path))?,
+        (Some((key, node)), None) => read_chart(key, &node)?,
         (None, _) => match old {
             Some(knit) => knit.chart.clone(),
             None => {
@@ -297,11 +297,12 @@ fn read_knit(object: &Object<'_>, preset: Option<&Structure>) -> Result<Structur
 }
 
 fn read_chart(key: &str, node: &Node<'_>) -> Result<Chart> {
-    match key {
+    let chart = match key {
         "knit" => Chart::preset(node.text()?),
         "chart" => Chart::from_grid(&lines(node)?.join("\n")),
         _ => Chart::from_worked(&lines(node)?.join("\n")),
-    }
+    };
+    chart.map_err(|e| e.at(&node.path))
 }
 
 fn lines<'a>(node: &Node<'a>) -> Result<Vec<&'a str>> {
