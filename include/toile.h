@@ -1255,7 +1255,7 @@ toile_status toile_sim_set_gravity(struct toile_sim *sim, const double gravity[3
 toile_status toile_sim_set_wind(struct toile_sim *sim, const double wind[3]);
 
 /**
- * Puts every vertex somewhere: positions [m] and velocities [m/s], shape [vertex_count, 3];
+ * Puts every vertex somewhere: positions [m] and velocities [m/s] within 1e6, shape [vertex_count, 3];
  * `velocities` NULL is at rest. `vertex_count` must be the simulation's.
  */
 toile_status toile_sim_set_positions(struct toile_sim *sim,

@@ -244,10 +244,15 @@ fn finite(what: &str, values: &[f64]) -> Result<()> {
     }
 }
 
+/// Largest component of a place [m] or a velocity [m/s] that a host may give; squares of much larger ones overflow.
+const MAX_COMPONENT: f64 = 1e6;
+
 fn finite_points(what: &str, points: &[Vec3]) -> Result<()> {
-    match points.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
+    // NaN is not within
+    let is_within = |p: &Vec3| p.iter().all(|c| c.abs() <= MAX_COMPONENT);
+    match points.iter().position(|p| !is_within(p)) {
         Some(i) => Err(Error::argument(format!(
-            "{what} {i} = ({}, {}, {}) must be finite",
+            "{what} {i} = ({}, {}, {}) must be finite and within {MAX_COMPONENT}",
             points[i].x, points[i].y, points[i].z
         ))),
         None => Ok(()),

@@ -461,3 +461,19 @@ fn a_step_that_cannot_be_taken_names_the_place() {
     assert!(error.message.contains("an edge at vertex "), "{error}");
     assert!(error.message.contains("at most 20 %"), "{error}");
 }
+
+#[test]
+fn places_and_velocities_beyond_all_measure_are_refused_by_vertex() {
+    let mut sim = sheet([0.4, 0.4], [2, 2], Fabric::default(), quiet());
+    let still: Vec<[f64; 3]> = sim.positions().iter().map(array).collect();
+    for wrong in [f64::NAN, f64::NEG_INFINITY, -1e160, 1.1e6] {
+        let mut list = still.clone();
+        list[3][1] = wrong;
+        let place = sim.set_positions(&list, None).unwrap_err().message;
+        assert!(place.contains("position of vertex 3"), "{place}");
+        let velocity = sim.set_positions(&still, Some(&list)).unwrap_err().message;
+        assert!(velocity.contains("velocity of vertex 3"), "{velocity}");
+    }
+    let now: Vec<[f64; 3]> = sim.positions().iter().map(array).collect();
+    assert_eq!(now, still);
+}

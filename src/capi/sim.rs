@@ -375,7 +375,7 @@ pub unsafe extern "C" fn toile_sim_set_wind(sim: *mut toile_sim, wind: *const f6
     entry!({ set_vector(sim, "wind", ["wind.x", "wind.y", "wind.z"], wind) })
 }
 
-/// Puts every vertex somewhere: positions [m] and velocities [m/s], shape [vertex_count, 3];
+/// Puts every vertex somewhere: positions [m] and velocities [m/s] within 1e6, shape [vertex_count, 3];
 /// `velocities` NULL is at rest. `vertex_count` must be the simulation's.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn toile_sim_set_positions(
