@@ -247,6 +247,7 @@ fn finite(what: &str, values: &[f64]) -> Result<()> {
 /// Largest component of a place [m] or a velocity [m/s] that a host may give; squares of much larger ones overflow.
 const MAX_COMPONENT: f64 = 1e6;
 
+/// Refuses points with a component that is not finite, or beyond [`MAX_COMPONENT`].
 fn finite_points(what: &str, points: &[Vec3]) -> Result<()> {
     // NaN is not within
     let is_within = |p: &Vec3| p.iter().all(|c| c.abs() <= MAX_COMPONENT);

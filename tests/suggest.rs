@@ -327,7 +327,7 @@ fn a_small_flat_panel_wants_no_yarns() {
     }
 }
 
-/// Positions whose strains overflow are refused with the vertex.
+/// Cloth that is strained beyond all measure is yarn; positions whose strains would overflow are refused with the vertex.
 #[test]
 fn what_is_no_cloth_is_yarn_or_refused() {
     // stretched by 5e6, as far as places may be: all of it is far beyond the fit, and the errors are numbers
