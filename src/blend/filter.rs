@@ -276,17 +276,17 @@ impl Filter {
         }
     }
 
-    /// Lets the constraints hold where they do not: vertices that are `free` or have nothing of their own go to the nodes first,
-    /// `v <- B^+ p`, nodes follow the others. Nothing moves where round-off alone breaks them.
-    pub fn settle(&self, values: &mut [Vec3], free: impl Fn(u32) -> bool) {
-        let r = self.excess(values);
-        let goes = |v: u32| free(v) || self.bare.binary_search(&v).is_ok();
-        for (v, r) in self.kept.iter().zip(&r).filter(|(v, _)| goes(**v)) {
-            values[*v as usize] += r;
-        }
+    /// Lets the constraints hold where they do not: nodes follow the vertices, as [`project`](Self::project) moves them, and
+    /// vertices that have nothing of their own go to the nodes. Nothing moves where round-off alone breaks them.
+    pub fn settle(&self, values: &mut [Vec3]) {
         let r = self.excess(values);
         if self.bare.is_empty() {
             self.subtract(&r, values);
+        }
+        for (v, r) in self.kept.iter().zip(&r) {
+            if self.bare.binary_search(v).is_ok() {
+                values[*v as usize] += r;
+            }
         }
     }
 

@@ -10,11 +10,14 @@
 //! (moving least squares; Lancaster and Salkauskas 1981), so `x_v = c` is a fixed combination of
 //! nodes that carries every affine motion exactly. `r` begins at the given reach and grows until at
 //! least eight nodes that do not lie on one line are in it.
+//!
+//! A vertex on a seam goes where the seam's rod is, `x_v = (1 - t) x_a + t x_b` with the foot `t` of `u_v` on the
+//! nearest piece of the rod: both sides of a seam meet there.
 
 use crate::error::{Error, Result};
 use crate::math::{Mat3, Vec2, Vec3};
 use crate::tri::GarmentMesh;
-use crate::yarn::YarnMesh;
+use crate::yarn::{Family, YarnMesh};
 
 /// Fewest nodes that carry a vertex.
 const FEWEST: usize = 8;
@@ -47,6 +50,7 @@ impl Follow {
             starts: vec![0],
             ..Self::default()
         };
+        let sewn = mesh.sewn();
         for panel in 0..mesh.panel_starts.len() - 1 {
             let vertices = mesh.panel_starts[panel]..mesh.panel_starts[panel + 1];
             let mut vertices = vertices.filter(|v| follows[*v as usize]).peekable();
@@ -55,9 +59,11 @@ impl Follow {
             }
             let reach = reach(panel as u32);
             let buckets = Buckets::new(yarns, panel as u32, reach);
+            let rods = rods(yarns, panel as u32);
             for vertex in vertices {
                 let place = mesh.uv[vertex as usize];
-                if !out.carry(yarns, &buckets, &place, reach) {
+                let on_rod = sewn[vertex as usize] && out.carry_on_rod(&rods, &place);
+                if !on_rod && !out.carry(yarns, &buckets, &place, reach) {
                     return Err(Error::geometry(format!(
                         "panel {panel}: too few yarns near vertex {vertex} at ({:.4}, {:.4}) m",
                         place.x, place.y
@@ -100,6 +106,26 @@ impl Follow {
         false
     }
 
+    /// Whether a piece of a rod is near enough to carry a vertex at `place`.
+    fn carry_on_rod(&mut self, rods: &[Piece], place: &Vec2) -> bool {
+        let mut nearest = None;
+        let mut least = f64::INFINITY;
+        for piece in rods {
+            let way = piece.uv[1] - piece.uv[0];
+            let t = ((place - piece.uv[0]).dot(&way) / way.norm_squared()).clamp(0.0, 1.0);
+            let apart = (piece.uv[0] + way * t - place).norm();
+            if apart < way.norm() && apart < least {
+                (least, nearest) = (apart, Some((piece.nodes, t)));
+            }
+        }
+        let Some((nodes, t)) = nearest else {
+            return false;
+        };
+        self.nodes.extend(nodes);
+        self.weights.extend([1.0 - t, t]);
+        true
+    }
+
     /// Writes the values of the carried vertices from those of the nodes.
     pub fn apply(&self, nodes: &[Vec3], vertices: &mut [Vec3]) {
         for (k, vertex) in self.vertices.iter().enumerate() {
@@ -113,6 +139,42 @@ impl Follow {
 
 fn basis(offset: &Vec2, r: f64) -> Vec3 {
     Vec3::new(1.0, offset.x / r, offset.y / r)
+}
+
+/// A piece of a seam's rod between two nodes, and where those lie in one of the seam's panels.
+struct Piece {
+    nodes: [u32; 2],
+    uv: [Vec2; 2],
+}
+
+/// Pieces of all rods along edges of a panel.
+fn rods(yarns: &YarnMesh, panel: u32) -> Vec<Piece> {
+    let mut other: Vec<(u32, Vec2)> = (yarns.across.iter())
+        .filter(|a| a.panel == panel)
+        .map(|a| (a.node, a.uv))
+        .collect();
+    other.sort_by_key(|a| a.0);
+    let own =
+        |node: u32| (yarns.node_panel[node as usize] == panel).then(|| yarns.uv[node as usize]);
+    let beyond = |node: u32| {
+        let k = other.binary_search_by_key(&node, |a| a.0).ok()?;
+        Some(other[k].1)
+    };
+    let mut pieces = Vec::new();
+    for (y, family) in yarns.yarn_family.iter().enumerate() {
+        if *family != Family::Seam {
+            continue;
+        }
+        let passages = &yarns.incidences[yarns.starts[y] as usize..yarns.starts[y + 1] as usize];
+        for nodes in passages.windows(2).map(|p| [p[0].node, p[1].node]) {
+            let sides = [nodes.map(own), nodes.map(beyond)];
+            pieces.extend(sides.into_iter().filter_map(|side| match side {
+                [Some(a), Some(b)] => Some(Piece { nodes, uv: [a, b] }),
+                _ => None,
+            }));
+        }
+    }
+    pieces
 }
 
 /// Nodes of one panel, sorted by the cells of a grid.

@@ -3,7 +3,7 @@
 //! The garment is compiled anew beside the one that lives, which stays as it is if anything cannot be, and what there is
 //! goes over, by name:
 //!
-//! * vertices stay where they are: those that followed yarns and have triangles again are the least-squares match that they were;
+//! * vertices stay where they are: those that followed yarns and have triangles again lie where they followed them to;
 //! * nodes, passages and strands that are there before and after keep positions, velocities, coordinates, friction and normals bit by
 //!   bit, but for nodes that ride on triangles now or are blended with them, which go where those say;
 //! * what comes in lies in the triangles as they are, `x = B v + lift n`, with the velocity of that, without friction;
@@ -177,14 +177,13 @@ impl Sim {
         };
         let mesh = &part.now.mesh;
         let (places, rates) = carried_along(&self.mesh, &state.positions, &state.velocities, mesh)?;
-        let free = |v: u32| !self.moves_by_itself(v);
         for (values, old, new) in [
             (&mut state.positions, &old.positions, places),
             (&mut state.velocities, &old.velocities, rates),
         ] {
             values.extend(picked(&before.nodes, &old[count..], |n| new[n]));
             if let Some(filter) = &part.coupling.filter {
-                filter.settle(values, free);
+                filter.settle(values);
             }
             part.coupling.riders.carry(values);
         }
