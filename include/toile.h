@@ -52,7 +52,7 @@
 #define TOILE_E_BUSY -3
 
 /**
- * The buffer is too small; nothing was written to it.
+ * The buffer is too small and nothing was written to it, or the count of an array is not the one that is expected.
  */
 #define TOILE_E_SIZE -4
 
@@ -478,7 +478,7 @@ typedef struct toile_sim_desc {
      */
     double wind[3];
     /**
-     * Pressure on the cloth along its normal [Pa].
+     * Pressure on the cloth along its normal [Pa], within 1e9.
      */
     double pressure;
     /**
@@ -1209,7 +1209,7 @@ toile_status toile_sim_set_body_pose(struct toile_sim *sim,
 
 /**
  * Says where the vertices of a mesh body are to be at the end of the next step, in the body's
- * frame [m], shape [vertex_count, 3]. `vertex_count` must be the body's. The cloth feels the
+ * frame [m], within 1e6, shape [vertex_count, 3]. `vertex_count` must be the body's. The cloth feels the
  * velocities that follow; before the first step or drape it is a placement, as with a pose.
  */
 toile_status toile_sim_set_body_vertices(struct toile_sim *sim,
@@ -1245,12 +1245,12 @@ toile_status toile_sim_set_number(struct toile_sim *sim, const char *name, doubl
 toile_status toile_sim_number(const struct toile_sim *sim, const char *name, double *out);
 
 /**
- * Sets the acceleration of gravity [m/s^2].
+ * Sets the acceleration of gravity [m/s^2], each component within 1e6.
  */
 toile_status toile_sim_set_gravity(struct toile_sim *sim, const double gravity[3]);
 
 /**
- * Sets the velocity of the air [m/s].
+ * Sets the velocity of the air [m/s], each component within 1e6.
  */
 toile_status toile_sim_set_wind(struct toile_sim *sim, const double wind[3]);
 
@@ -1288,9 +1288,12 @@ void toile_sim_free(struct toile_sim *sim);
  * Advances by exactly `dt` [s], in smaller steps inside where needed, or fails and leaves the
  * simulation as it was. `report` may be NULL. Stopped by the simulation's progress callback it is
  * TOILE_OK, has advanced by 0 and leaves everything as it was. TOILE_E_NO_ADMISSIBLE_STATE: pins or
- * bodies ask for what cannot be; a shorter step may pass.
+ * bodies ask for what cannot be; a shorter step may pass. `dt` is at most 1e6; no step inside is longer than
+ * the number "solver.step.max" (0.05 s), so a long one takes as long as many.
  */
-toile_status toile_sim_step(struct toile_sim *sim, double dt, struct toile_step_report *report);
+toile_status toile_sim_step(struct toile_sim *sim,
+                            double dt,
+                            struct toile_step_report *report);
 
 /**
  * Sews the garment and lets it come to rest. `desc` NULL takes the defaults; `report` may be NULL.

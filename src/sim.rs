@@ -98,9 +98,9 @@ impl Sim {
         let gravity = options.gravity.unwrap_or([0.0, -9.81, 0.0]);
         garment.check_geometry()?;
         let garment = &*fitted(garment, &options.settings)?;
-        finite("gravity", &gravity)?;
-        finite("wind", &options.wind)?;
-        finite("pressure", &[options.pressure])?;
+        within("gravity", &gravity, MAX_COMPONENT)?;
+        within("wind", &options.wind, MAX_COMPONENT)?;
+        within("pressure", &[options.pressure], MAX_PRESSURE)?;
         let masses = Cloth::new(garment, mesh.clone())?.masses;
         let compiled = Compiled::new(garment, &mesh, &options.settings, &options.settings)?;
         let Compiled {
@@ -244,8 +244,22 @@ fn finite(what: &str, values: &[f64]) -> Result<()> {
     }
 }
 
-/// Largest component of a place [m] or a velocity [m/s] that a host may give; squares of much larger ones overflow.
+/// Largest component of a place [m], a velocity [m/s] or of gravity [m/s^2] that a host may give; squares of much larger ones
+/// overflow.
 const MAX_COMPONENT: f64 = 1e6;
+/// Largest pressure on either side [Pa].
+const MAX_PRESSURE: f64 = 1e9;
+
+/// Refuses numbers that are not finite, or beyond `most`.
+fn within(what: &str, values: &[f64], most: f64) -> Result<()> {
+    // NaN is not within
+    match values.iter().find(|v| !(v.abs() <= most)) {
+        Some(v) => Err(Error::argument(format!(
+            "{what} = {v} must be finite and within {most}"
+        ))),
+        None => Ok(()),
+    }
+}
 
 /// Refuses points with a component that is not finite, or beyond [`MAX_COMPONENT`].
 fn finite_points(what: &str, points: &[Vec3]) -> Result<()> {

@@ -68,6 +68,18 @@ fn numbers_that_are_not_finite_are_refused_at_the_door_and_change_nothing() {
         let zero = [0.0; 4];
         let status = toile_sim_set_body_pose(sim.0, 0, zero.as_ptr(), zero.as_ptr());
         fails(status, TOILE_E_ARGUMENT);
+        // squares of these would overflow, or be of no use
+        let far = [0.0, -1.1e6, 0.0];
+        for status in [
+            toile_sim_set_gravity(sim.0, far.as_ptr()),
+            toile_sim_set_wind(sim.0, far.as_ptr()),
+            toile_sim_set_body_pose(sim.0, 0, far.as_ptr(), unit.as_ptr()),
+            toile_sim_set_number(sim.0, c"wind.z".as_ptr(), 1.1e6),
+            toile_sim_set_number(sim.0, c"pressure".as_ptr(), -1.1e9),
+            toile_sim_step(sim.0, 1.1e6, ptr::null_mut()),
+        ] {
+            fails(status, TOILE_E_ARGUMENT);
+        }
     }
     assert_eq!((sim.save(), sim.epoch()), before);
     sim.step(0.01);

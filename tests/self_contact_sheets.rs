@@ -172,7 +172,7 @@ fn throw(speed: f64, stiffness: f64, dt: f64, time: f64) -> Outcome {
         let x = loop {
             contact.begin_step(&sheets.state, &at(&x0, &x0, step));
             let x = implicit(&sheets, &contact, step);
-            if stiffness == 0.0 || contact.max_travel(&x0, &x) >= 1.0 {
+            if stiffness == 0.0 || contact.max_travel(&x0, &x).part >= 1.0 {
                 break x;
             }
             step *= 0.5;
@@ -237,18 +237,18 @@ fn travel_is_cut_where_sheets_would_pass() {
             .collect()
     };
     let x0 = place(0.1);
-    let part = contact.max_travel(&x0, &place(-0.1));
+    let part = contact.max_travel(&x0, &place(-0.1)).part;
     let safe = contact.spheres().safe_distance(0, half as u32);
     assert!(
         (part * 0.2 - (0.1 - safe)).abs() < 1e-3,
         "part {part}, safe distance {safe}"
     );
     let moved: Vec<Vec3> = x0.iter().map(|p| p + Vec3::new(3.0, -5.0, 1.0)).collect();
-    assert_eq!(contact.max_travel(&x0, &moved), 1.0);
-    assert_eq!(contact.max_travel(&x0, &x0), 1.0);
-    let apart = contact.max_travel(&place(1e-3), &place(0.2));
+    assert_eq!(contact.max_travel(&x0, &moved).part, 1.0);
+    assert_eq!(contact.max_travel(&x0, &x0).part, 1.0);
+    let apart = contact.max_travel(&place(1e-3), &place(0.2)).part;
     assert_eq!(apart, 1.0, "parting layers are never held");
-    let pressed = contact.max_travel(&place(1e-3), &place(-1e-3));
+    let pressed = contact.max_travel(&place(1e-3), &place(-1e-3)).part;
     assert!(pressed > 0.1 && pressed < 0.2, "{pressed}");
 }
 
@@ -293,7 +293,7 @@ fn travel_agrees_with_brute_force() {
                 }
             }
         }
-        let part = contact.max_travel(&x0, &x);
+        let part = contact.max_travel(&x0, &x).part;
         cut += usize::from(part < 1.0);
         assert!((part - expected).abs() < 2e-3, "{part} {expected}");
     }
@@ -427,7 +427,7 @@ fn twenty_thousand_triangles_are_searched() {
         .map(|(x, v)| x + v * 0.01)
         .collect();
     let start = Instant::now();
-    let part = contact.max_travel(&x, &end);
+    let part = contact.max_travel(&x, &end).part;
     let travelled = start.elapsed();
     assert_eq!(part, 1.0);
     println!(

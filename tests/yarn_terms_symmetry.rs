@@ -2,7 +2,7 @@
 //! sliding unknowns or constants give the same forces; no state gives anything but numbers.
 
 use crate::terms_cases::{gradient, hessian, rounding, sample};
-use crate::yarn_cases::{P, WORLD, cloth, every, lay, stitch, weave};
+use crate::yarn_cases::{BEFORE, P, WORLD, cloth, every, lay, stitch, weave};
 use toile::math::{Rotation, Vec2, Vec3};
 use toile::system::term::{Configuration, HessianKind};
 use toile::system::yarn::unknowns::Unknowns;
@@ -225,14 +225,19 @@ fn segments_keep_material() {
         inv_dt: 0.0,
         world: &WORLD,
     };
-    let mut part = 1.0_f64;
+    let (mut part, mut between) = (1.0_f64, [0; 2]);
     let mut highest = 0.0_f64;
     for term in &mut cloth.terms {
-        part = part.min(term.max_step(&at));
+        let most = term.max_step(&at);
+        if most.part < part {
+            (part, between) = (most.part, most.points);
+        }
         for e in 0..term.stencils().count() {
             highest = highest.max(term.value(e, &at));
         }
     }
     assert!((part - 0.8 / 1.5).abs() < 1e-9, "{part}");
+    let nodes = [1, 2].map(|i| BEFORE + cloth.mesh.incidences[i].node);
+    assert_eq!(between, nodes, "of the segment that has none left");
     assert!(highest.is_infinite());
 }

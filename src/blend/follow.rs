@@ -39,12 +39,12 @@ pub struct Follow {
 }
 
 impl Follow {
-    /// Weights for the vertices in `follows`; `reach` is the length of an edge of a panel [m].
+    /// Weights for the vertices in `follows`; of a panel, `name_and_reach` are its name and the length of its edges [m].
     pub fn new(
         mesh: &GarmentMesh,
         yarns: &YarnMesh,
         follows: &[bool],
-        reach: impl Fn(u32) -> f64,
+        name_and_reach: impl Fn(usize) -> (String, f64),
     ) -> Result<Self> {
         let mut out = Self {
             starts: vec![0],
@@ -57,7 +57,7 @@ impl Follow {
             if vertices.peek().is_none() {
                 continue;
             }
-            let reach = reach(panel as u32);
+            let (name, reach) = name_and_reach(panel);
             let buckets = Buckets::new(yarns, panel as u32, reach);
             let rods = rods(yarns, panel as u32);
             for vertex in vertices {
@@ -65,7 +65,7 @@ impl Follow {
                 let on_rod = sewn[vertex as usize] && out.carry_on_rod(&rods, &place);
                 if !on_rod && !out.carry(yarns, &buckets, &place, reach) {
                     return Err(Error::geometry(format!(
-                        "panel {panel}: too few yarns near vertex {vertex} at ({:.4}, {:.4}) m",
+                        "panel '{name}': too few yarns near vertex {vertex} at ({:.4}, {:.4}) m",
                         place.x, place.y
                     )));
                 }

@@ -235,7 +235,7 @@ pub unsafe extern "C" fn toile_sim_set_body_pose(
 }
 
 /// Says where the vertices of a mesh body are to be at the end of the next step, in the body's
-/// frame [m], shape [vertex_count, 3]. `vertex_count` must be the body's. The cloth feels the
+/// frame [m], within 1e6, shape [vertex_count, 3]. `vertex_count` must be the body's. The cloth feels the
 /// velocities that follow; before the first step or drape it is a placement, as with a pose.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn toile_sim_set_body_vertices(
@@ -322,34 +322,7 @@ pub unsafe extern "C" fn toile_sim_number(
     })
 }
 
-/// Sets three numbers, or none of them.
-unsafe fn set_vector(
-    sim: *mut toile_sim,
-    what: &str,
-    names: [&str; 3],
-    values: *const f64,
-) -> Result<()> {
-    SIMS.get(sim.addr())?;
-    // SAFETY: handed on.
-    let values = unsafe { input::numbers::<3>(values, what)? };
-    write(sim, |sim, _| {
-        let mut before = [0.0; 3];
-        for (old, name) in before.iter_mut().zip(names) {
-            *old = sim.number(name)?;
-        }
-        for k in 0..3 {
-            if let Err(error) = sim.set_number(names[k], values[k]) {
-                for j in 0..k {
-                    sim.set_number(names[j], before[j])?;
-                }
-                return Err(error);
-            }
-        }
-        Ok(())
-    })
-}
-
-/// Sets the acceleration of gravity [m/s^2].
+/// Sets the acceleration of gravity [m/s^2], each component within 1e6.
 ///
 /// cbindgen:ptrs-as-arrays=[[gravity; 3]]
 #[unsafe(no_mangle)]
@@ -358,21 +331,22 @@ pub unsafe extern "C" fn toile_sim_set_gravity(
     gravity: *const f64,
 ) -> toile_status {
     entry!({
-        set_vector(
-            sim,
-            "gravity",
-            ["gravity.x", "gravity.y", "gravity.z"],
-            gravity,
-        )
+        SIMS.get(sim.addr())?;
+        let gravity = input::numbers::<3>(gravity, "gravity")?;
+        write(sim, |sim, _| sim.set_gravity(gravity))
     })
 }
 
-/// Sets the velocity of the air [m/s].
+/// Sets the velocity of the air [m/s], each component within 1e6.
 ///
 /// cbindgen:ptrs-as-arrays=[[wind; 3]]
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn toile_sim_set_wind(sim: *mut toile_sim, wind: *const f64) -> toile_status {
-    entry!({ set_vector(sim, "wind", ["wind.x", "wind.y", "wind.z"], wind) })
+    entry!({
+        SIMS.get(sim.addr())?;
+        let wind = input::numbers::<3>(wind, "wind")?;
+        write(sim, |sim, _| sim.set_wind(wind))
+    })
 }
 
 /// Puts every vertex somewhere: positions [m] and velocities [m/s] within 1e6, shape [vertex_count, 3];

@@ -16,7 +16,7 @@ pub const TOILE_E_ARGUMENT: i32 = -1;
 pub const TOILE_E_HANDLE: i32 = -2;
 /// The handle is in use by another thread, or by the call that this callback runs in.
 pub const TOILE_E_BUSY: i32 = -3;
-/// The buffer is too small; nothing was written to it.
+/// The buffer is too small and nothing was written to it, or the count of an array is not the one that is expected.
 pub const TOILE_E_SIZE: i32 = -4;
 /// The present state of the object does not allow the call.
 pub const TOILE_E_STATE: i32 = -5;

@@ -164,7 +164,7 @@ pub struct toile_sim_desc {
     pub gravity: [f64; 3],
     /// Velocity of the air [m/s].
     pub wind: [f64; 3],
-    /// Pressure on the cloth along its normal [Pa].
+    /// Pressure on the cloth along its normal [Pa], within 1e9.
     pub pressure: f64,
     /// Worker threads, the calling one included; results do not depend on it. Default 1.
     pub threads: u32,

@@ -1,6 +1,8 @@
 //! The world around the cloth: bodies and their motion, positions, numbers.
 
-use super::{ContactSettings, Settings, Sim, finite, finite_points};
+use super::{
+    ContactSettings, MAX_COMPONENT, MAX_PRESSURE, Settings, Sim, finite, finite_points, within,
+};
 use crate::body::{Body, Pose};
 use crate::error::{Error, Result};
 use crate::math::{Rotation, Vec3};
@@ -48,7 +50,7 @@ impl Sim {
     /// has no velocity. A drape takes the body to its pose as it begins, and what lies on it along.
     pub fn set_body_pose(&mut self, body: u32, position: [f64; 3], xyzw: [f64; 4]) -> Result<()> {
         let b = check_index(body, self.bodies.len())?;
-        finite("position", &position)?;
+        within("position", &position, MAX_COMPONENT)?;
         finite("quaternion", &xyzw)?;
         let [x, y, z, w] = xyzw;
         let quaternion = nalgebra::Quaternion::new(w, x, y, z);
@@ -169,10 +171,27 @@ impl Sim {
         Ok(())
     }
 
+    /// Sets the acceleration of gravity [m/s^2].
+    pub fn set_gravity(&mut self, gravity: [f64; 3]) -> Result<()> {
+        within("gravity", &gravity, MAX_COMPONENT)?;
+        self.state.gravity = Vec3::from(gravity);
+        self.epoch += 1;
+        Ok(())
+    }
+
+    /// Sets the velocity of the air [m/s].
+    pub fn set_wind(&mut self, wind: [f64; 3]) -> Result<()> {
+        within("wind", &wind, MAX_COMPONENT)?;
+        self.state.wind = Vec3::from(wind);
+        self.epoch += 1;
+        Ok(())
+    }
+
     /// Sets a tunable, gravity (`gravity.x`), wind (`wind.x`) or `pressure` by dotted name.
     pub fn set_number(&mut self, name: &str, value: f64) -> Result<()> {
         finite(name, &[value])?;
-        if let Some(slot) = world_number(&mut self.state, name) {
+        if let Some((slot, most)) = world_number(&mut self.state, name) {
+            within(name, &[value], most)?;
             *slot = value;
         } else {
             let mut settings = self.settings.clone();
@@ -208,15 +227,17 @@ impl Sim {
     }
 }
 
-fn world_number<'a>(state: &'a mut State, name: &str) -> Option<&'a mut f64> {
-    match name {
-        "gravity.x" => Some(&mut state.gravity.x),
-        "gravity.y" => Some(&mut state.gravity.y),
-        "gravity.z" => Some(&mut state.gravity.z),
-        "wind.x" => Some(&mut state.wind.x),
-        "wind.y" => Some(&mut state.wind.y),
-        "wind.z" => Some(&mut state.wind.z),
-        "pressure" => Some(&mut state.pressure),
-        _ => None,
-    }
+/// A number of the world by name, and how large it may be.
+fn world_number<'a>(state: &'a mut State, name: &str) -> Option<(&'a mut f64, f64)> {
+    let slot = match name {
+        "gravity.x" => &mut state.gravity.x,
+        "gravity.y" => &mut state.gravity.y,
+        "gravity.z" => &mut state.gravity.z,
+        "wind.x" => &mut state.wind.x,
+        "wind.y" => &mut state.wind.y,
+        "wind.z" => &mut state.wind.z,
+        "pressure" => return Some((&mut state.pressure, MAX_PRESSURE)),
+        _ => return None,
+    };
+    Some((slot, MAX_COMPONENT))
 }

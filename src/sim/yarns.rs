@@ -112,8 +112,11 @@ impl YarnPart {
         for v in coupling.filter.iter().flat_map(|f| f.bare()) {
             follows[*v as usize] = false;
         }
-        let reach = |panel: u32| garment.panel_edge_length(&garment.panels[panel as usize]);
-        let follow = Follow::new(mesh, &yarns, &follows, reach)?;
+        let name_and_reach = |panel: usize| {
+            let panel = &garment.panels[panel];
+            (panel.name.clone(), garment.panel_edge_length(panel))
+        };
+        let follow = Follow::new(mesh, &yarns, &follows, name_and_reach)?;
         Ok(Some(Self {
             now: Arc::new(Yarns::laid(yarns, materials)),
             topology: Topology::default(),

@@ -35,12 +35,16 @@ pub(super) fn inadmissible(
             return Some(format!("{} {what} {b}", named(system, *v)));
         }
     }
-    if let Some(term) = system.terms.iter().find(|term| term.max_step(at) < 1.0) {
-        let reason = match term.name() {
-            Stretch::NAME => "a yarn would slide out between two contacts",
-            _ => "cloth would pass through itself",
-        };
-        return Some(reason.to_owned());
+    for term in &system.terms {
+        let most = term.max_step(at);
+        if most.part < 1.0 {
+            let what = match term.name() {
+                Stretch::NAME => "a yarn would slide out",
+                _ => "cloth would pass through itself",
+            };
+            let [a, b] = most.points.map(|p| named(system, p as usize));
+            return Some(format!("{what} between {a} and {b}"));
+        }
     }
     if dynamic
         && let Some((vertex, change)) = system.largest_stretch_change(start, x)

@@ -129,6 +129,24 @@ impl<'a> Stencils<'a> {
     }
 }
 
+/// How much of a motion is admissible.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MaxStep {
+    /// Part of the motion, 1 for all of it.
+    pub part: f64,
+    /// The two points between which no more is; equal where all is.
+    pub points: [u32; 2],
+}
+
+impl Default for MaxStep {
+    fn default() -> Self {
+        Self {
+            part: 1.0,
+            points: [0; 2],
+        }
+    }
+}
+
 /// An energy (or lagged dissipation potential) as a sum over stencils.
 ///
 /// `gradient` writes one vector, `hessian` writes the lower triangle of blocks row by row
@@ -190,10 +208,10 @@ pub trait Term: Send + Sync {
         let _ = (state, at);
         false
     }
-    /// Admissible part of the motion from `x0` to `x`, 1 for all of it.
-    fn max_step(&self, at: &Configuration<'_>) -> f64 {
+    /// How much of the motion from `x0` to `x` is admissible.
+    fn max_step(&self, at: &Configuration<'_>) -> MaxStep {
         let _ = at;
-        1.0
+        MaxStep::default()
     }
     /// Adds the force on a body and its torque about `origin` [N], [N m].
     fn add_wrench(

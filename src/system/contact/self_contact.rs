@@ -32,7 +32,7 @@ use crate::error::{Error, Result};
 use crate::math::{Mat3, Vec3};
 use crate::system::points::Points;
 use crate::system::state::{PairAnchor, State};
-use crate::system::term::{Configuration, HessianKind, Stencils, Term};
+use crate::system::term::{Configuration, HessianKind, MaxStep, Stencils, Term};
 use crate::yarn::Yarns;
 
 /// Reserve of the spheres, see [`Spheres`].
@@ -115,7 +115,7 @@ impl SelfContact {
 
     /// Largest part (0 to 1) of the way from `x0` to `x` on which no cloth can have passed through
     /// cloth.
-    pub fn max_travel(&self, x0: &[Vec3], x: &[Vec3]) -> f64 {
+    pub fn max_travel(&self, x0: &[Vec3], x: &[Vec3]) -> MaxStep {
         let count = self.spheres.radii.len();
         travel::max_travel(&self.spheres, &x0[..count], &x[..count])
     }
@@ -294,7 +294,7 @@ impl Term for SelfContact {
     }
 
     /// Friction anchors do not turn with the cloth.
-    fn max_step(&self, at: &Configuration<'_>) -> f64 {
+    fn max_step(&self, at: &Configuration<'_>) -> MaxStep {
         self.max_travel(at.x0, at.x)
     }
 

@@ -10,6 +10,7 @@
 use super::spheres::Spheres;
 use crate::math::Vec3;
 use crate::math::boxtree::{Aabb, BoxTree};
+use crate::system::term::MaxStep;
 
 /// Part of its distance that a pair keeps in any step.
 const KEPT: f64 = 0.7;
@@ -18,7 +19,7 @@ pub(super) const COINCIDENT: f64 = 1e-3;
 
 /// Largest part (0 to 1) of the way from `x0` to `x` on which no pair of spheres passes through
 /// each other.
-pub fn max_travel(spheres: &Spheres, x0: &[Vec3], x: &[Vec3]) -> f64 {
+pub fn max_travel(spheres: &Spheres, x0: &[Vec3], x: &[Vec3]) -> MaxStep {
     let tree = BoxTree::new(x0);
     let places = tree.fit(|i| Aabb::of(&[x0[i as usize]]));
     let moves = tree.fit(|i| Aabb::of(&[x[i as usize] - x0[i as usize]]));
@@ -32,7 +33,7 @@ pub fn max_travel(spheres: &Spheres, x0: &[Vec3], x: &[Vec3]) -> f64 {
             low + back <= reach && high + forth >= -reach
         })
     };
-    let mut fraction = 1.0_f64;
+    let mut most = MaxStep::default();
     tree.pairs(meet, |a, b| {
         if spheres.radii[a as usize] == 0.0 || spheres.radii[b as usize] == 0.0 {
             return;
@@ -45,13 +46,16 @@ pub fn max_travel(spheres: &Spheres, x0: &[Vec3], x: &[Vec3]) -> f64 {
         }
         let limit = spheres.safe_distance(a, b).min(KEPT * distance);
         if let Some(t) = first_time(&from, &by, limit)
-            && t < fraction
+            && t < most.part
             && !spheres.excluded(a, b)
         {
-            fraction = t;
+            most = MaxStep {
+                part: t,
+                points: [a, b],
+            };
         }
     });
-    fraction
+    most
 }
 
 /// First `t` in 0..1 at which `|from + t by|` falls to `limit < |from|`.

@@ -8,7 +8,7 @@
 //! ([`YarnMesh::weight`]).
 
 use super::super::state::State;
-use super::super::term::{Configuration, HessianKind, Stencils, Term};
+use super::super::term::{Configuration, HessianKind, MaxStep, Stencils, Term};
 use super::kernel::{Damped, Kernel, Local, Lower, MAX_POSITIONS, MAX_SLIDES};
 use super::unknowns::Unknowns;
 use crate::math::{Mat3, Vec3};
@@ -329,13 +329,20 @@ impl<K: Kernel<N>, const N: usize> Term for YarnTerm<K, N> {
         false
     }
 
-    fn max_step(&self, at: &Configuration<'_>) -> f64 {
+    fn max_step(&self, at: &Configuration<'_>) -> MaxStep {
+        let mut least = MaxStep::default();
         if !K::BOUNDS {
-            return 1.0;
+            return least;
         }
-        (0..self.elements.len())
-            .map(|e| self.with(e, at, K::bound))
-            .fold(1.0, f64::min)
+        for (e, element) in self.elements.iter().enumerate() {
+            let part = self.with(e, at, K::bound);
+            if part < least.part {
+                let blocks = &self.blocks[self.arity * e..][..self.arity];
+                let points = [0, 3].map(|k| blocks[usize::from(element.place[k] / 3)]);
+                least = MaxStep { part, points };
+            }
+        }
+        least
     }
 
     fn accept(&mut self, at: &Configuration<'_>, state: &mut State) {
