@@ -297,11 +297,11 @@ fn blend_regions_are_checked() {
     };
     refused(
         |g| g.blend_regions.push(region(5, 3)),
-        &["blend region 0", "panel 5 of 2"],
+        &["blend_regions[0]", "panel 5 of 2"],
     );
     refused(
         |g| g.blend_regions.push(region(0, 2)),
-        &["blend region 0", "2 corners"],
+        &["blend_regions[0]", "2 corners"],
     );
     refused(
         |g| {
@@ -310,6 +310,6 @@ fn blend_regions_are_checked() {
                 ..region(0, 3)
             });
         },
-        &["blend region 0", "4 hybrid rings, at most 3"],
+        &["blend_regions[0]", "4 hybrid rings, at most 3"],
     );
 }

@@ -80,9 +80,9 @@ pub unsafe extern "C" fn toile_sim_suggest_region(
         read(sim, |sim| {
             let desc = desc::read(desc)?;
             desc::check_target(out, true)?;
-            let tolerance = input::not_negative(desc.tolerance, "tolerance")?;
+            let tolerance = input::finite(desc.tolerance, "tolerance")?;
             let wish = Wish {
-                tolerance: (tolerance > 0.0).then_some(tolerance),
+                tolerance: (tolerance != 0.0).then_some(tolerance),
                 budget: (desc.budget > 0).then_some(desc.budget),
                 rings: desc.rings,
                 left_out: left_out(desc.left_out)?,

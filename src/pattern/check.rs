@@ -197,24 +197,24 @@ impl Garment {
     fn check_blend_region(&self, k: usize, region: &BlendRegion) -> Result<()> {
         if region.panel as usize >= self.panels.len() {
             return Err(Error::geometry(format!(
-                "blend region {k}: panel {} of {}",
+                "blend_regions[{k}]: panel {} of {}",
                 region.panel,
                 self.panels.len()
             )));
         }
-        let place = |e: Error| e.at(format!("blend region {k}"));
+        let place = |e: Error| e.at(format!("blend_regions[{k}]"));
         check_rings(region.rings).map_err(place)?;
         match &region.shape {
             Shape::Polygon(corners) => {
                 if corners.len() < 3 {
                     return Err(Error::geometry(format!(
-                        "blend region {k}: {} corners, at least 3 needed",
+                        "blend_regions[{k}]: {} corners, at least 3 needed",
                         corners.len()
                     )));
                 }
                 for (corner, p) in corners.iter().enumerate() {
                     check_point(p)
-                        .map_err(|e| e.at(format!("blend region {k} corner {corner}")))?;
+                        .map_err(|e| e.at(format!("blend_regions[{k}] corner {corner}")))?;
                 }
                 Ok(())
             }
@@ -225,7 +225,7 @@ impl Garment {
                 let panel = &self.panels[region.panel as usize];
                 if *edge as usize >= panel.edge_count() {
                     return Err(Error::geometry(format!(
-                        "blend region {k}: edge {edge} of {} of panel '{}'",
+                        "blend_regions[{k}]: edge {edge} of {} of panel '{}'",
                         panel.edge_count(),
                         panel.name
                     )));
