@@ -8,7 +8,8 @@
 //! a node and step by the clock and of processors, memory a node with the matrix and its factor, the seams' largest gap, and the smallest gap
 //! to the body. Wants `TOILE_DATA`; one thread, or those of `--threads`.
 //!
-//! `cargo bench --bench yarn_garment -- --loops 56000 --steps 3`; 0 steps lay the yarns and make the system alone.
+//! `cargo bench --bench yarn_garment -- --loops 56000 --steps 3`; 0 steps lay the yarns and make the system alone, `--solver` takes
+//! another `solver.linear.kind`.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -59,6 +60,7 @@ fn main() {
         let options = SimOptions {
             settings: Settings {
                 self_contact: 0.0,
+                linear_kind: given("--solver", 0.0),
                 ..common::settings()
             },
             ..SimOptions::default()

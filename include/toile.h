@@ -1218,7 +1218,7 @@ toile_status toile_sim_set_body_vertices(struct toile_sim *sim,
                                          size_t vertex_count);
 
 /**
- * Holds vertices: [count] numbers, targets [m], shape [count, 3], reached at the end of the next
+ * Holds vertices: [count] numbers, targets [m], within 1e6, shape [count, 3], reached at the end of the next
  * step. `targets` NULL holds them where they are. A vertex that is held already gets the new
  * target.
  */

@@ -460,6 +460,10 @@ fn a_step_that_cannot_be_taken_names_the_place() {
     let error = sim.step(0.01).unwrap_err();
     assert!(error.message.contains("an edge at vertex "), "{error}");
     assert!(error.message.contains("at most 20 %"), "{error}");
+    let held = "of what is held vertex 0 of panel 0 is to go farthest, by 1.000e3 m";
+    assert!(error.message.contains(held), "{error}");
+    let far = sim.pin(&[0], Some(&[[0.0, 1.1e6, 0.0]])).unwrap_err();
+    assert!(far.message.contains("target of vertex 0"), "{far}");
 }
 
 #[test]

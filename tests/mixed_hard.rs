@@ -135,6 +135,54 @@ fn regions_of_any_shape_stay_sound() {
     }
 }
 
+/// Regions that leave a corner of a panel, all of whose yarns they reach, take it in: a vertex without any mass could not move.
+#[test]
+fn corners_that_a_region_cuts_off_are_taken_in() {
+    let region = |width: f64| format!(r#"{{"panel": "p", "edge": 2, "width": {width}}}"#);
+    let text = |region: &str| {
+        format!(
+            r#"{{"toile_garment": 1, "name": "tip", "edge_length": 3e-3,
+                "fabrics": [{{"name": "f", "yarns": {{"preset": "sweater"}}}}],
+                "panels": [{{"name": "p", "fabric": "f", "vertices": [[0, 0], [0.024, 0], [0.0096, 0.016]],
+                    "edges": [[0, 1], [1, 2], [2, 0]]}}],
+                "blend_regions": [{region}]}}"#
+        )
+    };
+    let mut random = crate::sheets::Random::new(5);
+    for k in 0..24 {
+        let region = if k < 12 {
+            region(0.015 + 4e-4 * f64::from(k))
+        } else {
+            let [x, y] = [
+                0.012 + 0.012 * random.signed(),
+                0.008 + 0.008 * random.signed(),
+            ];
+            let radius = 0.014 + 0.008 * random.signed();
+            format!(r#"{{"panel": "p", "disc": {{"center": [{x}, {y}], "radius": {radius}}}}}"#)
+        };
+        let mut sim = match make(&text(&region), -9.81) {
+            Ok(sim) => sim,
+            // a disc that hardly meets the panel
+            Err(e) => {
+                assert!(
+                    k >= 12 && e.message.contains("holds no triangle"),
+                    "{region}: {e}"
+                );
+                continue;
+            }
+        };
+        let masses = sim.point_masses();
+        let active = sim.active_vertices();
+        for (v, mass) in masses.iter().enumerate().take(active.len()) {
+            assert!(!active[v] || *mass > 0.0, "{region}: vertex {v}");
+        }
+        for _ in 0..3 {
+            let _ = sim.step(1e-3).expect(&region);
+        }
+        is_sound(&sim, &region);
+    }
+}
+
 /// Every single triangle may be the region, whatever the ratio of triangles to yarns, and its fabric may
 /// be a hundred times softer or stiffer than its yarns.
 #[test]

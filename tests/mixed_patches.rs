@@ -180,6 +180,7 @@ fn every_piece_of_yarn_weighs_once() {
     let mass = |full: &[bool]| {
         let joined = direct::join(&garment, &mesh, full, laid.clone(), &materials).expect("direct");
         let yarns = Yarns::laid(joined.yarns, materials.to_vec());
+        let full = &joined.full;
         let kept: Vec<usize> = (0..full.len()).filter(|t| !full[*t]).collect();
         let share: Vec<_> = kept.iter().map(|t| joined.share[*t]).collect();
         let masses: Vec<_> = kept.iter().map(|t| joined.masses[*t]).collect();

@@ -150,6 +150,7 @@ fn impossible_charts_name_row_and_column() {
         ("co 4 turn k 3", "row 2 column 1:"),
         ("co 4 turn k 3 knit 1", "row 2 column 3:"),
         ("co 4 turn * k 2", "row 2 column 1:"),
+        ("co 4 turn * * 3 k 4", "row 2 column 2:"),
         ("co 4 turn k 0 k 4", "row 2 column 2:"),
         ("co 4 turn * k 9999 * 9999", "row 2 column 4:"),
         ("co 4 turn turn k 4", "row 2 column 1:"),

@@ -137,6 +137,7 @@ pub fn join(
         Some(Arc::new(filter))
     };
     Ok(Joined {
+        full: region.full.clone(),
         share: own.iter().map(|w| [*w; 2]).collect(),
         own,
         masses: (0..count)

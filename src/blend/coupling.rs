@@ -26,6 +26,8 @@ pub struct Joined {
     pub passages: Vec<u32>,
     /// What joins them, by points (vertices, then nodes).
     pub coupling: Coupling,
+    /// For each triangle of the whole mesh whether yarns stand for it.
+    pub full: Vec<bool>,
     /// Part of the membrane of each triangle of the whole mesh that is its own, along weft and warp.
     pub share: Vec<[f64; 2]>,
     /// Part of its other energies.

@@ -14,6 +14,8 @@ use crate::yarn::{Family, YarnMaterial, YarnMesh};
 
 /// Least part of a triangle's membrane that is left to it.
 const LEAST: f64 = 0.01;
+/// Part of a triangle's yarn below which what is left of it is no mass.
+const NO_MASS: f64 = 1e-6;
 /// Pieces of a segment that ends in another triangle than it begins in.
 const PIECES: usize = 16;
 
@@ -188,6 +190,22 @@ impl Cover {
     pub(super) fn mass(&self, triangle: usize) -> Option<f64> {
         let taken = self.taken[triangle].mass;
         (taken > 0.0).then(|| (self.laid[triangle].mass - taken).max(0.0))
+    }
+
+    /// Triangles that are not `full` at a vertex to which none of its triangles leaves any mass.
+    pub(super) fn bare(&self, mesh: &GarmentMesh, full: &[bool]) -> Vec<usize> {
+        let mut heavy = vec![false; mesh.uv.len()];
+        let kept = || (0..full.len()).filter(|t| !full[*t]);
+        for t in kept() {
+            let least = NO_MASS * self.laid[t].mass;
+            if self.mass(t).is_none_or(|mass| mass > least) {
+                for v in mesh.triangles[t] {
+                    heavy[v as usize] = true;
+                }
+            }
+        }
+        let bare = |t: &usize| mesh.triangles[*t].iter().any(|v| !heavy[*v as usize]);
+        kept().filter(bare).collect()
     }
 
     /// What is left to each triangle of its membrane along weft and warp.

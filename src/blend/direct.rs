@@ -11,7 +11,8 @@
 //! ```
 //!
 //! where `c_T > 0`, and the fabric's own elsewhere: every piece of yarn weighs once, as yarn or as triangle, and an even
-//! stretch pulls evenly on both sides of the border. Bending is left as it is. A rod of a seam between yarns and
+//! stretch pulls evenly on both sides of the border. Bending is left as it is. Where that leaves a vertex without any mass, as in
+//! a corner that the region cuts off, its triangles are taken out as well. A rod of a seam between yarns and
 //! triangles rides on the edge of the triangles; where both sides are yarns it is free.
 
 use super::coupling::{Coupling, Joined};
@@ -31,19 +32,30 @@ pub fn join(
     materials: &[YarnMaterial],
 ) -> Result<Joined> {
     let places = Places::new(mesh, &laid)?;
-    let inside = places.inside(&laid, |t| full[t]);
+    let mut full = full.to_vec();
+    let (inside, cover) = loop {
+        let inside = places.inside(&laid, |t| full[t]);
+        let own = places.own(&laid);
+        let cover = Cover::new(garment, mesh, &full, &laid, materials, own, |nodes| {
+            let reaches = nodes.iter().any(|n| inside[*n as usize]);
+            f64::from(u8::from(reaches))
+        })?;
+        let bare = cover.bare(mesh, &full);
+        if bare.is_empty() {
+            break (inside, cover);
+        }
+        for t in bare {
+            full[t] = true;
+        }
+    };
     let list = places.riders(mesh, &laid, |_, t| !full[t]);
-    let own = places.own(&laid);
-    let cover = Cover::new(garment, mesh, full, &laid, materials, own, |nodes| {
-        let reaches = nodes.iter().any(|n| inside[*n as usize]);
-        f64::from(u8::from(reaches))
-    })?;
     let mut joined = Joined {
-        share: cover.share(mesh, full),
+        share: cover.share(mesh, &full),
         masses: (0..full.len())
             .map(|t| cover.mass(t).filter(|_| !full[t]))
             .collect(),
         own: vec![1.0; full.len()],
+        full,
         ..Joined::default()
     };
     if inside.iter().all(|i| *i) && list.is_empty() {

@@ -63,7 +63,7 @@ impl Region {
             if region.rings != rings {
                 return Err(Error::unsupported(format!(
                     "{} hybrid rings around the region of panel '{}', {rings} around the first one: all \
-                     regions of a garment have the same number",
+                     regions of a garment have the same number, and change it at once by the vertices' alpha",
                     region.rings, panel.name
                 ))
                 .at(place(k)));

@@ -252,7 +252,7 @@ pub unsafe extern "C" fn toile_sim_set_body_vertices(
     })
 }
 
-/// Holds vertices: [count] numbers, targets [m], shape [count, 3], reached at the end of the next
+/// Holds vertices: [count] numbers, targets [m], within 1e6, shape [count, 3], reached at the end of the next
 /// step. `targets` NULL holds them where they are. A vertex that is held already gets the new
 /// target.
 #[unsafe(no_mangle)]

@@ -202,7 +202,8 @@ impl Garment {
                 self.panels.len()
             )));
         }
-        let place = |e: Error| e.at(format!("blend_regions[{k}]"));
+        let name = &self.panels[region.panel as usize].name;
+        let place = |e: Error| e.at(format!("blend_regions[{k}] of panel '{name}'"));
         check_rings(region.rings).map_err(place)?;
         match &region.shape {
             Shape::Polygon(corners) => {

@@ -2,7 +2,7 @@
 //!
 //! Points are vertices and, counted on, nodes.
 
-use super::{Sim, finite};
+use super::{MAX_COMPONENT, Sim, finite, within};
 use crate::error::{Error, Result};
 use crate::math::{Vec2, Vec3};
 use crate::system::state::Pin;
@@ -48,7 +48,7 @@ impl Sim {
                 )));
             }
             for (p, t) in points.iter().zip(targets) {
-                finite(&format!("target of {}", self.name(*p)), t)?;
+                within(&format!("target of {}", self.name(*p)), t, MAX_COMPONENT)?;
             }
             let mut order: Vec<usize> = (0..points.len()).collect();
             order.sort_by_key(|k| points[*k]);

@@ -49,9 +49,8 @@ impl YarnPart {
         found: &Settings,
     ) -> Result<Option<Self>> {
         let region = Region::new(garment, mesh)?;
-        let left_out = region.full.clone();
-        let mut wanted: Vec<u32> = (left_out.iter().zip(&mesh.triangle_panel))
-            .filter(|(left_out, _)| **left_out)
+        let mut wanted: Vec<u32> = (region.full.iter().zip(&mesh.triangle_panel))
+            .filter(|(full, _)| **full)
             .map(|p| *p.1)
             .collect();
         wanted.sort_unstable();
@@ -82,13 +81,14 @@ impl YarnPart {
         let joined = if options.everywhere || region.hybrid.contains(&true) {
             blended::join(garment, mesh, &region, laid, &materials, options)?
         } else {
-            direct::join(garment, mesh, &left_out, laid, &materials)?
+            direct::join(garment, mesh, &region.full, laid, &materials)?
         };
         let Joined {
             yarns,
             nodes,
             passages,
             coupling,
+            full: left_out,
             share,
             own,
             masses,

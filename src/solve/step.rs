@@ -1,8 +1,10 @@
 //! `step(dt)`: substeps of backward Euler whose size follows contact, strain and Newton's method.
 
+use super::admissible::named;
 use super::engine::{Attempt, Engine, Motion};
 use crate::error::{Error, Result, Status};
-use crate::system::state::State;
+use crate::system::build::System;
+use crate::system::state::{Pin, State};
 
 /// Sums over the substeps of one step or drape.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -36,7 +38,27 @@ pub fn step(
     if !matches!(done, Ok(Some(_))) {
         state.clone_from(&saved);
     }
-    done
+    done.map_err(|mut error| {
+        if error.status == Status::NoAdmissibleState
+            && let Some(held) = farthest(&engine.system, state)
+        {
+            error.message += &held;
+        }
+        error
+    })
+}
+
+/// What is held and is to go farthest, if anything is to go.
+fn farthest(system: &System, state: &State) -> Option<String> {
+    let way = |p: &Pin| (p.target - state.positions[p.vertex as usize]).norm();
+    let pin = (state.pins.iter()).max_by(|a, b| way(a).total_cmp(&way(b)))?;
+    (way(pin) > 0.0).then(|| {
+        let name = named(system, pin.vertex as usize);
+        format!(
+            "; of what is held {name} is to go farthest, by {:.3e} m",
+            way(pin)
+        )
+    })
 }
 
 fn advance(

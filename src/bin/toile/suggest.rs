@@ -229,6 +229,9 @@ fn costs(found: &Suggestion) -> String {
     row("triangles", &found.triangles);
     row("suggested (laid)", &found.cost);
     row("yarns everywhere", &found.everywhere);
+    if found.regions.is_empty() {
+        text += "\nno region: no triangle's error is above the tolerance, or the least region has more nodes than the budget\n";
+    }
     text
 }
 

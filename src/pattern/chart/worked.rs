@@ -114,6 +114,10 @@ fn row_of(row: usize, words: &[Word<'_>]) -> Result<Vec<(Stitch, usize)>> {
                 star = Some((out.len(), word.column));
                 continue;
             };
+            if from == out.len() {
+                let reason = "no stitch between the stars";
+                return Err(refuse(row, word.column, reason));
+            }
             (from, count(row, words, &mut at)? - 1)
         } else {
             let Some(stitch) = stitch(&word.text.to_ascii_lowercase()) else {

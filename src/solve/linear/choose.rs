@@ -61,6 +61,9 @@ const ALWAYS_DIRECT: usize = 300;
 /// The same of a system with yarns, in motion and in all else.
 const ALWAYS_DIRECT_YARNS: [usize; 2] = [3_000, 20_000];
 
+/// Blocks from which on yarns in motion are solved by parts.
+const BY_PARTS: usize = 150_000;
+
 /// Iterations up to which a factor is kept for the next matrix. A new one costs triangles that many, yarns, whose every iteration
 /// is dear, a few.
 const KEPT: u32 = 15;
@@ -158,6 +161,8 @@ pub struct Automatic {
     /// For matrices of triangles in which inertia has a say.
     near: Option<ConjugateGradients>,
     factored: ConjugateGradients,
+    /// For large matrices of yarns in motion.
+    parted: ConjugateGradients,
     chosen: Choice,
     /// Whether `near` was not enough for a matrix since the last `forget`.
     slow: bool,
@@ -170,6 +175,7 @@ enum Choice {
     Direct,
     Near,
     Factored,
+    Parted,
 }
 
 impl Automatic {
@@ -180,6 +186,7 @@ impl Automatic {
             direct: Direct::new(workers),
             near: triangles.then(|| incomplete(made)),
             factored: factored(made, workers),
+            parted: parted(workers),
             chosen: Choice::Direct,
             slow: false,
             ratios: Vec::new(),
@@ -191,6 +198,7 @@ impl Automatic {
         match (self.chosen, &self.near) {
             (Choice::Near, Some(near)) => near,
             (Choice::Factored, _) => &self.factored,
+            (Choice::Parted, _) => &self.parted,
             _ => &self.direct,
         }
     }
@@ -210,6 +218,11 @@ impl Automatic {
             return false;
         }
         matrix.n() < ALWAYS_DIRECT_YARNS[0] || self.stiffness_ratio(matrix) >= MOVING_YARNS
+    }
+
+    /// Whether a matrix is solved by the factors of its parts.
+    fn is_large(&mut self, matrix: &BlockMatrix) -> bool {
+        self.near.is_none() && matrix.n() >= BY_PARTS && self.stiffness_ratio(matrix) < MOVING_YARNS
     }
 
     /// Median of stiffness over mass; infinite where the rows sum to nothing (statics).
@@ -252,6 +265,7 @@ impl LinearSolver for Automatic {
             near.forget();
         }
         self.factored.forget();
+        self.parted.forget();
         self.chosen = Choice::Direct;
         self.slow = false;
     }
@@ -261,6 +275,10 @@ impl LinearSolver for Automatic {
             && near.prepare(matrix).is_ok()
         {
             self.chosen = Choice::Near;
+            return Ok(());
+        }
+        if self.is_large(matrix) && self.parted.prepare(matrix).is_ok() {
+            self.chosen = Choice::Parted;
             return Ok(());
         }
         self.chosen = Choice::Factored;
@@ -282,6 +300,7 @@ impl LinearSolver for Automatic {
         let solved = match (self.chosen, &mut self.near) {
             (Choice::Near, Some(near)) => near.solve(matrix, b, x, tolerance),
             (Choice::Factored, _) => self.factored.solve(matrix, b, x, tolerance),
+            (Choice::Parted, _) => self.parted.solve(matrix, b, x, tolerance),
             _ => return self.direct.solve(matrix, b, x, tolerance),
         };
         if self.chosen == Choice::Near {
@@ -301,6 +320,7 @@ impl LinearSolver for Automatic {
         self.direct.bytes()
             + self.near.as_ref().map_or(0, LinearSolver::bytes)
             + self.factored.bytes()
+            + self.parted.bytes()
             + 8 * self.ratios.len()
             + size_of::<Mat3>() * self.sums.len()
     }
