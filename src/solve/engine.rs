@@ -506,8 +506,10 @@ fn linear_solver(system: &System, settings: &Settings, workers: &Workers) -> Box
         return choose::filtered(settings.linear_kind as u32, filter, workers);
     }
     let (kind, blocks) = (settings.linear_kind as u32, system.block_count());
-    if system.has_yarns() {
-        return choose::solver(kind, blocks, Made::Yarns, workers);
+    if let Some(yarns) = &system.yarns {
+        let knit = !yarns.mesh.wraps.is_empty();
+        let made = if knit { Made::Knits } else { Made::Weaves };
+        return choose::solver(kind, blocks, made, workers);
     }
     let priorities = seam_priorities(&system.cloth.mesh);
     choose::solver(kind, blocks, Made::Triangles(Some(&priorities)), workers)

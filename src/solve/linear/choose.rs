@@ -23,8 +23,9 @@
 //! iterations there: kept factors serve motion and rest, and every matrix of small systems is factored as it is. In a hanging swatch of 16 772
 //! nodes a step of 1 ms took half the time by kept factors that it took by those of overlapping parts
 //! ([`super::schwarz`]), both with the same error, and a quarter of the memory; at 4 292 nodes, where exact factors took twice as long as kept ones, a little
-//! less. Weaves are another matter: patches of 61 600 nodes take as long by parts, of 250 000 nodes two thirds of the time. The choice does not know
-//! that yet; `solver.linear.kind` 5 asks for parts.
+//! less; a garment of 223 485 nodes of jersey took as long, with 7.2 and 9.2 KB a node. Weaves are another matter: patches of 61 600 nodes
+//! take as long by parts, of 250 000 nodes two thirds of the time, a dress of as many a third: there large ones in motion are
+//! solved by parts.
 //!
 //! `rho` is read off the matrix: internal stiffness has zero row sums, so what a row's blocks sum
 //! to is its mass term, and `rho` is the median over vertices of trace(diagonal block) over
@@ -61,8 +62,8 @@ const ALWAYS_DIRECT: usize = 300;
 /// The same of a system with yarns, in motion and in all else.
 const ALWAYS_DIRECT_YARNS: [usize; 2] = [3_000, 20_000];
 
-/// Blocks from which on yarns in motion are solved by parts.
-const BY_PARTS: usize = 150_000;
+/// Blocks from which on weaves in motion are solved by parts.
+const BY_PARTS: usize = 120_000;
 
 /// Iterations up to which a factor is kept for the next matrix. A new one costs triangles that many, yarns, whose every iteration
 /// is dear, a few.
@@ -83,8 +84,10 @@ pub enum Made<'a> {
     /// Of triangles. The priorities (see [`super::ordering`]), one for each block row, mark the vertices of seams for the
     /// incomplete factorization.
     Triangles(Option<&'a [u8]>),
-    /// Of yarns, alone or with triangles.
-    Yarns,
+    /// Of weaves, alone or with triangles.
+    Weaves,
+    /// Of yarns among which there are knits.
+    Knits,
 }
 
 /// A solver by its number in the settings, for `n` block rows: 0 chooses for each matrix, 1 sparse
@@ -131,7 +134,7 @@ fn factored(made: Made<'_>, workers: &Workers) -> ConjugateGradients {
     };
     match made {
         Made::Triangles(_) => cg(DROPPED).for_newton(KEPT),
-        Made::Yarns => cg(DROPPED_YARNS).for_newton(KEPT_YARNS[0]).in_energy(),
+        Made::Weaves | Made::Knits => cg(DROPPED_YARNS).for_newton(KEPT_YARNS[0]).in_energy(),
     }
 }
 
@@ -161,8 +164,8 @@ pub struct Automatic {
     /// For matrices of triangles in which inertia has a say.
     near: Option<ConjugateGradients>,
     factored: ConjugateGradients,
-    /// For large matrices of yarns in motion.
-    parted: ConjugateGradients,
+    /// For large matrices of weaves in motion.
+    parted: Option<ConjugateGradients>,
     chosen: Choice,
     /// Whether `near` was not enough for a matrix since the last `forget`.
     slow: bool,
@@ -186,7 +189,7 @@ impl Automatic {
             direct: Direct::new(workers),
             near: triangles.then(|| incomplete(made)),
             factored: factored(made, workers),
-            parted: parted(workers),
+            parted: matches!(made, Made::Weaves).then(|| parted(workers)),
             chosen: Choice::Direct,
             slow: false,
             ratios: Vec::new(),
@@ -195,10 +198,10 @@ impl Automatic {
     }
 
     fn chosen(&self) -> &dyn LinearSolver {
-        match (self.chosen, &self.near) {
-            (Choice::Near, Some(near)) => near,
-            (Choice::Factored, _) => &self.factored,
-            (Choice::Parted, _) => &self.parted,
+        match (self.chosen, &self.near, &self.parted) {
+            (Choice::Near, Some(near), _) => near,
+            (Choice::Factored, _, _) => &self.factored,
+            (Choice::Parted, _, Some(parted)) => parted,
             _ => &self.direct,
         }
     }
@@ -220,9 +223,12 @@ impl Automatic {
         matrix.n() < ALWAYS_DIRECT_YARNS[0] || self.stiffness_ratio(matrix) >= MOVING_YARNS
     }
 
-    /// Whether a matrix is solved by the factors of its parts.
-    fn is_large(&mut self, matrix: &BlockMatrix) -> bool {
-        self.near.is_none() && matrix.n() >= BY_PARTS && self.stiffness_ratio(matrix) < MOVING_YARNS
+    /// The solver by factors of parts, if it is for this matrix.
+    fn by_parts(&mut self, matrix: &BlockMatrix) -> Option<&mut ConjugateGradients> {
+        let large = self.parted.is_some()
+            && matrix.n() >= BY_PARTS
+            && self.stiffness_ratio(matrix) < MOVING_YARNS;
+        self.parted.as_mut().filter(|_| large)
     }
 
     /// Median of stiffness over mass; infinite where the rows sum to nothing (statics).
@@ -265,7 +271,9 @@ impl LinearSolver for Automatic {
             near.forget();
         }
         self.factored.forget();
-        self.parted.forget();
+        if let Some(parted) = &mut self.parted {
+            parted.forget();
+        }
         self.chosen = Choice::Direct;
         self.slow = false;
     }
@@ -277,7 +285,9 @@ impl LinearSolver for Automatic {
             self.chosen = Choice::Near;
             return Ok(());
         }
-        if self.is_large(matrix) && self.parted.prepare(matrix).is_ok() {
+        if let Some(parted) = self.by_parts(matrix)
+            && parted.prepare(matrix).is_ok()
+        {
             self.chosen = Choice::Parted;
             return Ok(());
         }
@@ -297,10 +307,10 @@ impl LinearSolver for Automatic {
         x: &mut [Vec3],
         tolerance: f64,
     ) -> Result<u32, LinearError> {
-        let solved = match (self.chosen, &mut self.near) {
-            (Choice::Near, Some(near)) => near.solve(matrix, b, x, tolerance),
-            (Choice::Factored, _) => self.factored.solve(matrix, b, x, tolerance),
-            (Choice::Parted, _) => self.parted.solve(matrix, b, x, tolerance),
+        let solved = match (self.chosen, &mut self.near, &mut self.parted) {
+            (Choice::Near, Some(near), _) => near.solve(matrix, b, x, tolerance),
+            (Choice::Factored, _, _) => self.factored.solve(matrix, b, x, tolerance),
+            (Choice::Parted, _, Some(parted)) => parted.solve(matrix, b, x, tolerance),
             _ => return self.direct.solve(matrix, b, x, tolerance),
         };
         if self.chosen == Choice::Near {
@@ -320,7 +330,7 @@ impl LinearSolver for Automatic {
         self.direct.bytes()
             + self.near.as_ref().map_or(0, LinearSolver::bytes)
             + self.factored.bytes()
-            + self.parted.bytes()
+            + self.parted.as_ref().map_or(0, LinearSolver::bytes)
             + 8 * self.ratios.len()
             + size_of::<Mat3>() * self.sums.len()
     }
