@@ -137,6 +137,75 @@ fn slip_begins_at_the_bound_and_ends_below_it() {
     assert!((off(strand + 1, other) - bound).abs() < 1e-12);
 }
 
+/// Material that is shot through one contact swings between its neighbours and comes to rest there. At a constant normal force the
+/// sum of kinetic energy, stretch and the anchor's spring never grows, what it loses is `sum mu lambda |d anchor|`, and in the end
+/// the yarn sticks within `mu lambda / k_f`. Velocity Verlet; the anchor follows after each step.
+#[test]
+fn friction_takes_the_energy_of_sliding() {
+    let mut cloth = cloth("", weave(5, 5), |_| true);
+    let (x, mut u) = (cloth.laid(), cloth.u());
+    let mut state = cloth.state(&x, &u, 4);
+    let mut terms = std::mem::take(&mut cloth.terms);
+    terms.retain(|t| ["yarn_stretch", "sliding_friction"].contains(&t.name()));
+    let strand = cloth.mesh.stack_starts[12] as usize;
+    let i = cloth.mesh.stacks[strand].incidence as usize;
+    let (block, c) = cloth.unknowns.slides[i].expect("it slides");
+    state.strands = loose(&cloth.mesh, &u);
+    state.strands[strand].contact = 0.02;
+    let bound = MATERIAL.friction * 0.02;
+    let mass = MATERIAL.density * P;
+    let spring = 2.0 * MATERIAL.stretch / P;
+    let h = 0.01 / (spring / mass).sqrt();
+    // as far as a tenth of the pitch without friction
+    let mut rate = 0.1 * P * (spring / mass).sqrt();
+    let mut lost = 0.0;
+    let mut look = |u: &[f64], state: &mut State, follow: bool| {
+        let blocks = cloth.blocks(&x, u);
+        let at = Configuration {
+            x: &blocks,
+            x0: &blocks,
+            u,
+            inv_dt: 0.0,
+            world: &WORLD,
+        };
+        let (mut energy, mut g) = (0.0, vec![Vec3::zeros(); blocks.len()]);
+        for term in &mut terms {
+            let _ = term.begin_step(state, &at);
+            energy += (0..term.stencils().count())
+                .map(|e| term.value(e, &at))
+                .sum::<f64>();
+            add(term.as_ref(), &at, &mut g);
+            if follow {
+                term.accept(&at, state);
+            }
+        }
+        (energy, g[block as usize][usize::from(c)])
+    };
+    let start = 0.5 * mass * rate * rate + look(&u, &mut state, false).0;
+    let mut energy = start;
+    for _ in 0..20_000 {
+        let (_, slope) = look(&u, &mut state, false);
+        rate -= 0.5 * h * slope / mass;
+        u[i] += h * rate;
+        let before = state.strands[strand].anchor;
+        let (_, slope) = look(&u, &mut state, true);
+        rate -= 0.5 * h * slope / mass;
+        lost += bound * (state.strands[strand].anchor - before).abs();
+        let now = 0.5 * mass * rate * rate + look(&u, &mut state, false).0;
+        assert!(now < energy + 1e-4 * start, "{now:e} after {energy:e} J");
+        energy = now;
+    }
+    let off = (u[i] - state.strands[strand].anchor).abs();
+    println!(
+        "{start:.3e} J, {energy:.3e} J left, {lost:.3e} J lost: {:.1e} beside it; {:.2} of the bound",
+        (start - energy - lost) / start,
+        off * MATERIAL.anchor / bound
+    );
+    assert!((start - energy - lost).abs() < 1e-3 * start);
+    assert!(lost > 0.9 * start, "{lost:e} of {start:e} J");
+    assert!(off <= bound / MATERIAL.anchor * (1.0 + 1e-12));
+}
+
 /// A yarn pulled over `n` held pegs: the tension grows at each by `(1 + mu s)/(1 - mu s)`, `s = sin(t/2)`, in the
 /// limit by `exp(mu Theta)`.
 #[test]
