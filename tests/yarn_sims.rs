@@ -8,7 +8,7 @@ use toile::pattern::import::garment_from_json;
 use toile::sim::{ContactSettings, DrapeOptions, Outcome, Settings, Sim, SimOptions};
 use toile::system::contact::spheres::Spheres;
 use toile::system::points::Points;
-use toile::yarn::{Layout, YarnMaterial, Yarns, lay};
+use toile::yarn::{Family, Layout, YarnMaterial, Yarns, lay};
 
 /// A rectangle of a fabric of yarns, every yarn simulated.
 pub(crate) fn patch(yarns: &str, width: f64, height: f64, region: &str) -> String {
@@ -93,6 +93,65 @@ fn a_weave_pulled_along_its_yarns_is_as_stiff_as_they_are() {
     let y = sim.positions()[top_vertex as usize].y;
     assert!((y - 0.02 * (1.0 + strain)).abs() < 2e-5, "{y}");
     assert!(sim.active_vertices().iter().all(|a| !a));
+}
+
+/// Contacts that stick need no unknowns. A weft is pulled out of a patch whose warps are held, with coordinates that are unknowns where
+/// contacts slip and with all of them unknown, where friction is a spring `k_f`: the coordinates come out the same within
+/// `mu lambda / k_f`. Slip is looked for as a step begins, so that it comes late by a part of what is pulled in one step.
+#[test]
+fn contacts_that_stick_need_no_unknowns() {
+    let pulled = |anchor: f64, sliding: f64, way: f64| {
+        let yarns = format!(
+            r#"{{"weave": "plain", "warp_pitch": 0.002, "radius": 0.0004, "bending": 0.001, "friction": 0.3,
+                "anchor": {anchor}}}"#
+        );
+        let numbers = [
+            ("yarn.sliding", sliding),
+            ("yarn.relative_velocity", 1e-6),
+            ("solver.newton.velocity_tolerance", 1e-7),
+        ];
+        let mut sim = sim(&patch(&yarns, 0.012, 0.012, WHOLE), 0.0, &numbers);
+        let mesh = sim.yarns().expect("yarns").clone();
+        let held: Vec<u32> = (0..mesh.uv.len() as u32)
+            .filter(|n| (mesh.uv[*n as usize].y - 0.006).abs() > 0.005)
+            .collect();
+        sim.pin_yarn_nodes(&held, None).expect("pin");
+        let off = |y: &usize| (mesh.uv[mesh.yarn(*y)[0].node as usize].y - 0.006).abs();
+        let weft = (0..mesh.yarn_count())
+            .filter(|y| mesh.yarn_family[*y] == Family::Weft)
+            .min_by(|a, b| off(a).total_cmp(&off(b)))
+            .expect("a weft");
+        let end = mesh.yarn(weft).last().expect("a node").node;
+        let (start, steps) = (sim.yarn_nodes()[end as usize], (8e-4 / way).round() as u32);
+        let mut unknowns = 0;
+        for k in 1..=steps {
+            let x = start + Vec3::x() * (way * f64::from(k));
+            sim.pin_yarn_nodes(&[end], Some(&[x.into()])).expect("pin");
+            let _ = sim.step(1e-3).expect("step");
+            unknowns += sim.info().unknowns;
+        }
+        let force = sim.yarn_compressions().iter().copied().fold(0.0, f64::max);
+        let slip = sim.yarn_slips().iter().map(|s| s.abs()).fold(0.0, f64::max);
+        (
+            sim.checkpoint().u,
+            0.3 * force / anchor,
+            slip,
+            unknowns as f64 / f64::from(steps),
+        )
+    };
+    for (anchor, way, late) in [(1e3, 2e-6, 0.0), (1e4, 1e-6, 0.0), (1e5, 1e-6, 0.25e-6)] {
+        let (some, bound, slip, fewer) = pulled(anchor, 1.0, way);
+        let (all, _, _, every) = pulled(anchor, 2.0, way);
+        let pairs = some.iter().zip(&all);
+        let apart = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        println!(
+            "k_f {anchor} N/m: coordinates apart by {apart:.1e} m, mu lambda / k_f {bound:.1e} m, slip {slip:.1e} m, \
+             {fewer:.0} of {every:.0} unknowns"
+        );
+        assert!(apart < bound + late, "{apart:e} m, {bound:e} m");
+        assert!(slip > 3e-4, "{slip:e} m");
+        assert!(fewer < 0.7 * every, "{fewer} of {every}");
+    }
 }
 
 /// What hangs weighs what it is made of.

@@ -14,6 +14,14 @@ from square import square
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="sends signals")
 
 
+@pytest.fixture(autouse=True)
+def pythons_own_handler():
+    """Jobs in the background of a shell begin with Ctrl-C ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 def hung():
     """Takes far longer to drape than these tests wait."""
     sim = toile.Sim(square(0.006))
