@@ -162,7 +162,7 @@ fn main() {
     println!(
         "                              a step  a step    clock      CPU  a Newton  a linear  a sim s    node"
     );
-    for dt in [1e-3, 5e-3] {
+    for dt in [1e-3, 5e-3, 1e-2] {
         let points: Vec<(f64, f64)> = sizes.iter().filter_map(|&n| motion(n, dt)).collect();
         println!("cost ~ nodes^{:.2}", exponent(&points));
     }

@@ -24,7 +24,7 @@
 //! nodes a step of 1 ms took half the time by kept factors that it took by those of overlapping parts
 //! ([`super::schwarz`]), both with the same error, and a quarter of the memory; at 4 292 nodes, where exact factors took twice as long as kept ones, a little
 //! less; a garment of 223 485 nodes of jersey took as long, with 7.2 and 9.2 KB a node. Weaves are another matter: patches of 61 600 nodes
-//! take as long by parts, of 250 000 nodes two thirds of the time, a dress of as many a third: there large ones in motion are
+//! take as long by parts, of 250 000 nodes as long on one thread and two thirds of the time on two: there large ones in motion are
 //! solved by parts.
 //!
 //! `rho` is read off the matrix: internal stiffness has zero row sums, so what a row's blocks sum
