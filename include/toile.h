@@ -470,11 +470,11 @@ typedef struct toile_sim_desc {
      */
     size_t struct_size;
     /**
-     * Acceleration of gravity [m/s^2]; default (0, -9.81, 0).
+     * Acceleration of gravity [m/s^2], within 1e6; default (0, -9.81, 0).
      */
     double gravity[3];
     /**
-     * Velocity of the air [m/s].
+     * Velocity of the air [m/s], within 1e6.
      */
     double wind[3];
     /**
@@ -1197,7 +1197,7 @@ toile_status toile_sim_set_body_sdf(struct toile_sim *sim,
                                     uint32_t *out_body);
 
 /**
- * Says where a body is to be at the end of the next step: position [m] of its origin and rotation
+ * Says where a body is to be at the end of the next step: position [m] of its origin, within 1e6, and rotation
  * x, y, z, w. The cloth feels the velocity that follows. Before the first step or drape it is a
  * placement: the body stands there at once and has no velocity. A drape takes the body to its pose, and
  * cloth that rests on it goes along.

@@ -211,7 +211,7 @@ pub unsafe extern "C" fn toile_sim_set_body_sdf(
     })
 }
 
-/// Says where a body is to be at the end of the next step: position [m] of its origin and rotation
+/// Says where a body is to be at the end of the next step: position [m] of its origin, within 1e6, and rotation
 /// x, y, z, w. The cloth feels the velocity that follows. Before the first step or drape it is a
 /// placement: the body stands there at once and has no velocity. A drape takes the body to its pose, and
 /// cloth that rests on it goes along.

@@ -160,9 +160,9 @@ pub struct toile_sdf_grid_desc {
 pub struct toile_sim_desc {
     /// sizeof(toile_sim_desc).
     pub struct_size: usize,
-    /// Acceleration of gravity [m/s^2]; default (0, -9.81, 0).
+    /// Acceleration of gravity [m/s^2], within 1e6; default (0, -9.81, 0).
     pub gravity: [f64; 3],
-    /// Velocity of the air [m/s].
+    /// Velocity of the air [m/s], within 1e6.
     pub wind: [f64; 3],
     /// Pressure on the cloth along its normal [Pa], within 1e9.
     pub pressure: f64,

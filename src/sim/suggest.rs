@@ -61,6 +61,7 @@ impl Sim {
         let cost = Cost {
             yarn_nodes: nodes as u64,
             carried_nodes: carried as u64,
+            triangles: part.left_out.iter().filter(|gone| !**gone).count() as u64,
             ..found.cost
         };
         let moving = nodes - carried + vertices - follow;

@@ -32,7 +32,7 @@ pub(super) struct YarnPart {
     /// What joins them to the triangles.
     pub(super) coupling: Coupling,
     /// Triangles that the yarns stand for.
-    left_out: Vec<bool>,
+    pub(super) left_out: Vec<bool>,
     share: Vec<[f64; 2]>,
     own: Vec<f64>,
     masses: Vec<Option<f64>>,
